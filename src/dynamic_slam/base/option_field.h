@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string_view>
+
+namespace dynamic_slam {
+
+// What is known of one option beside its name and value. Every options struct lists its fields once:
+//
+//   struct OrbOptions {
+//     int features = 1000;
+//     template <class Self, class Visitor>
+//     static void VisitFields(Self& self, Visitor&& visit) {
+//       visit("features", self.features, OptionField{"", 50, 20000, "Keypoints wanted in an image."});
+//     }
+//   };
+//
+// and a struct that holds others visits them by name: visit("orb", self.orb). From this one list come YAML
+// reading and writing, range checks, unknown-key errors, --set and the documentation.
+// Field types: bool, int, double, uint64_t, std::string.
+struct OptionField {
+  std::string_view unit;  // "px", "rad", "deg", "s", ... or "" for a pure number
+  double low = 0;         // smallest and largest value allowed; not looked at for bool and string
+  double high = 0;
+  std::string_view help;  // one sentence
+};
+
+}  // namespace dynamic_slam

@@ -1,0 +1,26 @@
+#pragma once
+
+#include "dynamic_slam/base/option_field.h"
+
+namespace dynamic_slam {
+
+struct OrbOptions {
+  int features = 1000;
+  int levels = 8;
+  double scale_factor = 1.2;
+  int fast_threshold = 20;
+  int fast_threshold_min = 7;
+
+  template <class Self, class Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("features", self.features, OptionField{"", 50, 20000, "Keypoints wanted in an image."});
+    visit("levels", self.levels, OptionField{"", 1, 12, "Levels of the image pyramid."});
+    visit("scale_factor", self.scale_factor, OptionField{"", 1.05, 2.0, "Scale between two pyramid levels."});
+    visit("fast_threshold", self.fast_threshold,
+          OptionField{"grey levels", 1, 255, "FAST contrast threshold where texture is plenty."});
+    visit("fast_threshold_min", self.fast_threshold_min,
+          OptionField{"grey levels", 1, 255, "FAST contrast threshold where texture is scarce."});
+  }
+};
+
+}  // namespace dynamic_slam
