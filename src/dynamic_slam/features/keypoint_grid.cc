@@ -1,0 +1,35 @@
+#include "dynamic_slam/features/keypoint_grid.h"
+
+#include <cmath>
+
+#include "dynamic_slam/base/error.h"
+
+namespace dynamic_slam {
+
+void KeypointGrid::Build(const FeatureSet& features, const std::array<double, 4>& bounds) {
+  const double width = bounds[2] - bounds[0], height = bounds[3] - bounds[1];
+  DS_CHECK(width > 0 && height > 0 && width < 1e6 && height < 1e6, "width={} height={}", width, height);
+  min_x_ = static_cast<float>(bounds[0]);
+  min_y_ = static_cast<float>(bounds[1]);
+  columns_ = static_cast<int>(std::ceil(width / kCellSizePx));
+  rows_ = static_cast<int>(std::ceil(height / kCellSizePx));
+
+  // Counting sort by cell; stable, so a cell's keypoints keep their order.
+  const size_t count = features.size();
+  cell_begin_.assign(static_cast<size_t>(columns_) * rows_ + 1, 0);
+  cell_of_.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    const Keypoint& keypoint = features.keypoints[i];
+    cell_of_[i] = static_cast<uint32_t>(Row(keypoint.y) * columns_ + Column(keypoint.x));
+    ++cell_begin_[cell_of_[i] + 1];
+  }
+  for (size_t cell = 1; cell < cell_begin_.size(); ++cell) cell_begin_[cell] += cell_begin_[cell - 1];
+  next_ = cell_begin_;
+  entries_.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    const Keypoint& keypoint = features.keypoints[i];
+    entries_[next_[cell_of_[i]]++] = {keypoint.x, keypoint.y, static_cast<uint32_t>(i)};
+  }
+}
+
+}  // namespace dynamic_slam

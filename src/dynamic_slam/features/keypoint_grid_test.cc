@@ -1,0 +1,105 @@
+#include "dynamic_slam/features/keypoint_grid.h"
+
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/random.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr std::array<double, 4> kBounds = {-12.5, -7.25, 652.75, 491};
+
+FeatureSet RandomFeatures(int count, uint64_t seed) {
+  Random random(seed);
+  FeatureSet features;
+  for (int i = 0; i < count; ++i) {
+    Keypoint keypoint;
+    // A little beyond the bounds too.
+    keypoint.x = static_cast<float>(random.Uniform(kBounds[0] - 5, kBounds[2] + 5));
+    keypoint.y = static_cast<float>(random.Uniform(kBounds[1] - 5, kBounds[3] + 5));
+    features.keypoints.push_back(keypoint);
+    features.descriptors.emplace_back();
+  }
+  return features;
+}
+
+std::vector<uint32_t> Query(const KeypointGrid& grid, float x, float y, float radius_px) {
+  std::vector<uint32_t> found;
+  grid.ForEachInRadius(x, y, radius_px, [&](uint32_t index) { found.push_back(index); });
+  return found;
+}
+
+TEST(KeypointGrid, FindsExactlyWhatBruteForceFinds) {
+  const FeatureSet features = RandomFeatures(1500, 3);
+  KeypointGrid grid;
+  grid.Build(features, kBounds);
+  EXPECT_EQ(grid.size(), features.size());
+  Random random(4);
+  size_t total = 0;
+  for (int query = 0; query < 500; ++query) {
+    const float x = static_cast<float>(random.Uniform(-60, 700));
+    const float y = static_cast<float>(random.Uniform(-60, 540));
+    const float radius_px = static_cast<float>(random.Uniform(0, 80));
+    std::vector<uint32_t> expected;
+    for (uint32_t i = 0; i < features.size(); ++i) {
+      const float dx = features.keypoints[i].x - x, dy = features.keypoints[i].y - y;
+      if (dx * dx + dy * dy <= radius_px * radius_px) expected.push_back(i);
+    }
+    EXPECT_THAT(Query(grid, x, y, radius_px), testing::UnorderedElementsAreArray(expected));
+    total += expected.size();
+  }
+  EXPECT_GT(total, 1000u);
+}
+
+TEST(KeypointGrid, TheOrderIsByCellThenByIndex) {
+  FeatureSet features;
+  for (const auto& [x, y] : {std::pair{40.0f, 40.0f}, {3.0f, 3.0f}, {41.0f, 39.0f}, {5.0f, 2.0f}}) {
+    Keypoint keypoint;
+    keypoint.x = x;
+    keypoint.y = y;
+    features.keypoints.push_back(keypoint);
+    features.descriptors.emplace_back();
+  }
+  KeypointGrid grid;
+  grid.Build(features, {0, 0, 100, 100});
+  EXPECT_THAT(Query(grid, 20, 20, 100), testing::ElementsAre(1, 3, 0, 2));
+}
+
+TEST(KeypointGrid, TheRadiusIsInclusive) {
+  FeatureSet features;
+  features.keypoints.resize(1);
+  features.descriptors.resize(1);
+  features.keypoints[0].x = 30;
+  features.keypoints[0].y = 10;
+  KeypointGrid grid;
+  grid.Build(features, {0, 0, 100, 100});
+  EXPECT_THAT(Query(grid, 20, 10, 10), testing::ElementsAre(0));
+  EXPECT_THAT(Query(grid, 20, 10, 9.999f), testing::IsEmpty());
+  EXPECT_THAT(Query(grid, 30, 10, 0), testing::ElementsAre(0));
+}
+
+TEST(KeypointGrid, OddQueriesFindNothing) {
+  KeypointGrid grid;
+  EXPECT_THAT(Query(grid, 0, 0, 10), testing::IsEmpty());  // never built
+  grid.Build(RandomFeatures(100, 5), kBounds);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(Query(grid, 0, 0, -1), testing::IsEmpty());
+  EXPECT_THAT(Query(grid, nan, 0, 10), testing::IsEmpty());
+  EXPECT_THAT(Query(grid, 0, 0, nan), testing::IsEmpty());
+  EXPECT_THAT(Query(grid, 1e30f, -1e30f, 10), testing::IsEmpty());
+  EXPECT_EQ(Query(grid, 0, 0, 1e9f).size(), 100u);
+  grid.Build(FeatureSet(), kBounds);
+  EXPECT_THAT(Query(grid, 0, 0, 1e9f), testing::IsEmpty());
+}
+
+TEST(KeypointGrid, EmptyBoundsAreABug) {
+  KeypointGrid grid;
+  EXPECT_THROW(grid.Build(FeatureSet(), {0, 0, 0, 10}), InternalError);
+}
+
+}  // namespace
+}  // namespace dynamic_slam
