@@ -7,7 +7,8 @@
 
 namespace dynamic_slam {
 
-// 256 binary tests of a steered BRIEF descriptor (Rublee et al., ORB, 2011), test i in bit i % 64 of word i / 64.
+// 256 binary tests of a steered BRIEF descriptor (Rublee et al., ORB, 2011), test i in bit i % 64 of
+// word i / 64.
 using Descriptor = std::array<uint64_t, 4>;
 
 // Number of differing bits, 0 to 256.

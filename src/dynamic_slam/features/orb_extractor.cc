@@ -1,0 +1,140 @@
+#include "dynamic_slam/features/orb_extractor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/features/corner_selection.h"
+#include "dynamic_slam/features/fast_detector.h"
+#include "dynamic_slam/features/steered_brief.h"
+#include "dynamic_slam/features/undistortion_table.h"
+
+namespace dynamic_slam {
+namespace {
+
+// Bytes between rows of the blurred levels: whole cache lines, an odd number of them, since rows a power of
+// two apart would compete for the same places in the cache.
+int BlurredStride(int width) { return 64 * ((width + 63) / 64 | 1); }
+
+}  // namespace
+
+class OrbExtractor::Impl {
+ public:
+  Impl(const OrbOptions& options, const Camera& camera)
+      : options_(options),
+        width_(camera.width),
+        height_(camera.height),
+        brief_(BlurredStride(camera.width)),
+        undistortion_(camera),
+        levels_(options.levels) {
+    DS_CHECK(options.levels >= 1 && options.scale_factor > 1, "levels={} scale_factor={}", options.levels,
+             options.scale_factor);
+    double scale = 1;
+    for (Level& level : levels_) {
+      const int width = std::max(1, cvRound(width_ / scale)), height = std::max(1, cvRound(height_ / scale));
+      level.image.create(height, width, CV_8UC1);
+      level.blurred_storage = cv::Mat::zeros(height, BlurredStride(width_), CV_8UC1);
+      level.blurred = level.blurred_storage.colRange(0, width);
+      level.scale_x = static_cast<float>(width_) / static_cast<float>(width);
+      level.scale_y = static_cast<float>(height_) / static_cast<float>(height);
+      scales_.push_back(static_cast<float>(scale));
+      weights_.push_back(1 / scale);
+      scale *= options.scale_factor;
+    }
+    available_.resize(levels_.size());
+  }
+
+  void Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet* features) {
+    DS_CHECK(grey.type() == CV_8UC1 && grey.cols == width_ && grey.rows == height_,
+             "type={} {}x{}, not {}x{}", grey.type(), grey.cols, grey.rows, width_, height_);
+    DS_CHECK(mask.empty() || (mask.type() == CV_8UC1 && mask.size() == grey.size()), "type={} {}x{}",
+             mask.type(), mask.cols, mask.rows);
+    features->Clear();
+    levels_[0].image = grey;  // shares the pixels
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      Level& level = levels_[i];
+      if (i > 0) cv::resize(levels_[i - 1].image, level.image, level.image.size(), 0, 0, cv::INTER_LINEAR);
+      level.corners.clear();
+      fast_.Detect(level.image, SteeredBrief::kBorder, options_.fast_threshold_min, &level.corners);
+      if (!mask.empty()) DropMasked(mask, &level);
+      available_[i] = static_cast<int>(level.corners.size());
+    }
+    const std::vector<int> wanted = ShareOverLevels(options_.features, weights_, available_);
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      Level& level = levels_[i];
+      selector_.Select(level.image.cols, level.image.rows, wanted[i], options_.fast_threshold,
+                       &level.corners);
+      if (!level.corners.empty()) Describe(level, static_cast<int>(i), features);
+    }
+    levels_[0].image = cv::Mat();  // the caller's pixels are not ours to keep
+  }
+
+  void SetFeatures(int features) {
+    DS_CHECK(features > 0, "features={}", features);
+    options_.features = features;
+  }
+
+  const std::vector<float>& scales() const { return scales_; }
+
+ private:
+  struct Level {
+    cv::Mat image;                     // CV_8UC1
+    cv::Mat blurred_storage, blurred;  // the latter is the part of the former that has the size of the image
+    float scale_x, scale_y;            // full-resolution px per px; the two differ as sizes are whole numbers
+    std::vector<Corner> corners;
+
+    // Pixel centres are at whole numbers, so the image's corner is at -0.5 at every level.
+    float FullX(float x) const { return (x + 0.5f) * scale_x - 0.5f; }
+    float FullY(float y) const { return (y + 0.5f) * scale_y - 0.5f; }
+  };
+
+  static void DropMasked(const cv::Mat& mask, Level* level) {
+    std::erase_if(level->corners, [&](const Corner& corner) {
+      return mask.at<uint8_t>(cvRound(level->FullY(corner.y)), cvRound(level->FullX(corner.x))) != 0;
+    });
+  }
+
+  void Describe(Level& level, int octave, FeatureSet* features) {
+    SteeredBrief::Blur(level.image, &level.blurred, &blur_row_);
+    for (const Corner& corner : level.corners) {
+      Keypoint keypoint;
+      keypoint.raw_x = keypoint.x = level.FullX(corner.x);
+      keypoint.raw_y = keypoint.y = level.FullY(corner.y);
+      undistortion_.Undistort(&keypoint.x, &keypoint.y);
+      keypoint.angle_rad = SteeredBrief::Angle(level.image, corner.x, corner.y);
+      keypoint.response = corner.score;
+      keypoint.octave = octave;
+      features->keypoints.push_back(keypoint);
+      features->descriptors.push_back(
+          brief_.Describe(level.blurred.ptr<uint8_t>(corner.y) + corner.x, keypoint.angle_rad));
+    }
+  }
+
+  OrbOptions options_;
+  int width_, height_;
+  FastDetector fast_;
+  CornerSelector selector_;
+  SteeredBrief brief_;
+  UndistortionTable undistortion_;
+  std::vector<Level> levels_;
+  std::vector<float> scales_;
+  std::vector<double> weights_;  // share of the features: 1 / scale
+  std::vector<int> available_;
+  std::vector<uint8_t> blur_row_;
+};
+
+OrbExtractor::OrbExtractor(const OrbOptions& options, const Camera& camera)
+    : impl_(std::make_unique<Impl>(options, camera)) {}
+OrbExtractor::~OrbExtractor() = default;
+
+void OrbExtractor::Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet* features) {
+  impl_->Extract(grey, mask, features);
+}
+
+void OrbExtractor::SetFeatures(int features) { impl_->SetFeatures(features); }
+
+const std::vector<float>& OrbExtractor::OctaveScales() const { return impl_->scales(); }
+
+}  // namespace dynamic_slam

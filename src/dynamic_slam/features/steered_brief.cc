@@ -1,0 +1,134 @@
+#include "dynamic_slam/features/steered_brief.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/features/multiversion.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr int kPatchRadius = 15;  // px, of the orientation
+constexpr int kTestRadius = 13;   // px, of the tests: 3 px of blur fit between them and kBorder
+constexpr int kRowPixels = 32;    // a row of the patch, and one more
+
+// For each row of the patch 1 within the circle, else 0; and the same times the horizontal offset.
+struct CircleWeights {
+  std::array<std::array<int16_t, kRowPixels>, 2 * kPatchRadius + 1> inside{}, x{};
+};
+
+constexpr CircleWeights MakeCircleWeights() {
+  CircleWeights weights;
+  for (int v = -kPatchRadius; v <= kPatchRadius; ++v) {
+    for (int u = -kPatchRadius; u <= kPatchRadius; ++u) {
+      // A radius of 15.5 makes the circle as wide as the patch.
+      if (4 * (u * u + v * v) > 31 * 31) continue;
+      weights.inside[v + kPatchRadius][u + kPatchRadius] = 1;
+      weights.x[v + kPatchRadius][u + kPatchRadius] = static_cast<int16_t>(u);
+    }
+  }
+  return weights;
+}
+
+constexpr CircleWeights kCircle = MakeCircleWeights();
+
+// First moments of the patch whose top left pixel is given.
+DS_MULTIVERSION
+void Moments(const uint8_t* __restrict patch, ptrdiff_t stride, int* moment_x, int* moment_y) {
+  int sum_x = 0, sum_y = 0;
+  for (int row = 0; row <= 2 * kPatchRadius; ++row, patch += stride) {
+    const int16_t* inside = kCircle.inside[row].data();
+    const int16_t* weight = kCircle.x[row].data();
+    int row_sum = 0;
+    for (int i = 0; i < kRowPixels; ++i) {
+      const int16_t pixel = patch[i];
+      row_sum += pixel * inside[i];
+      sum_x += pixel * weight[i];
+    }
+    sum_y += (row - kPatchRadius) * row_sum;
+  }
+  *moment_x = sum_x;
+  *moment_y = sum_y;
+}
+
+// Gaussian, sigma 2, in 256ths.
+constexpr std::array<uint16_t, 4> kGauss = {56, 49, 33, 18};
+
+// out[x] = the seven rows or columns around it, weighted. Pointers may be of one array, a column apart.
+DS_MULTIVERSION
+void WeightSeven(const uint8_t* a3, const uint8_t* a2, const uint8_t* a1, const uint8_t* m, const uint8_t* b1,
+                 const uint8_t* b2, const uint8_t* b3, int count, uint8_t* __restrict out) {
+  for (int x = 0; x < count; ++x) {
+    const uint16_t sum = static_cast<uint16_t>(
+        static_cast<uint16_t>(m[x] * kGauss[0]) + static_cast<uint16_t>((a1[x] + b1[x]) * kGauss[1]) +
+        static_cast<uint16_t>((a2[x] + b2[x]) * kGauss[2]) +
+        static_cast<uint16_t>((a3[x] + b3[x]) * kGauss[3]) + uint16_t{128});
+    out[x] = static_cast<uint8_t>(sum >> 8);
+  }
+}
+
+}  // namespace
+
+SteeredBrief::SteeredBrief(ptrdiff_t stride) : offsets_(kAngles) {
+  // Isotropic Gaussian pairs (Calonder et al., BRIEF, 2010, variant II).
+  Random random(1);
+  for (int test = 0; test < kTests; ++test) {
+    std::array<double, 4> point;
+    for (int i = 0; i < 4; i += 2) {
+      do {
+        point[i] = 31.0 / 5 * random.Gaussian();
+        point[i + 1] = 31.0 / 5 * random.Gaussian();
+      } while (std::hypot(point[i], point[i + 1]) > kTestRadius);
+    }
+    for (int k = 0; k < kAngles; ++k) {
+      const double angle = 2 * std::numbers::pi * k / kAngles;
+      const double c = std::cos(angle), s = std::sin(angle);
+      const auto offset = [&](double x, double y) {
+        return static_cast<int32_t>(std::lround(s * x + c * y) * stride + std::lround(c * x - s * y));
+      };
+      offsets_[k].first[test] = offset(point[0], point[1]);
+      offsets_[k].second[test] = offset(point[2], point[3]);
+    }
+  }
+}
+
+float SteeredBrief::Angle(const cv::Mat& image, int x, int y) {
+  int moment_x, moment_y;
+  Moments(image.ptr<uint8_t>(y - kPatchRadius) + (x - kPatchRadius), static_cast<ptrdiff_t>(image.step),
+          &moment_x, &moment_y);
+  return std::atan2(static_cast<float>(moment_y), static_cast<float>(moment_x));
+}
+
+Descriptor SteeredBrief::Describe(const uint8_t* centre, float angle_rad) const {
+  const int turns = static_cast<int>(std::lround(angle_rad * (kAngles / (2 * std::numbers::pi_v<float>))));
+  const Offsets& offsets = offsets_[static_cast<unsigned>(turns) % kAngles];
+  Descriptor descriptor;
+  for (int word = 0; word < 4; ++word) {
+    const int32_t* first = offsets.first.data() + 64 * word;
+    const int32_t* second = offsets.second.data() + 64 * word;
+    uint64_t bits = 0;
+    for (int i = 0; i < 64; ++i) bits |= static_cast<uint64_t>(centre[first[i]] < centre[second[i]]) << i;
+    descriptor[word] = bits;
+  }
+  return descriptor;
+}
+
+void SteeredBrief::Blur(const cv::Mat& image, cv::Mat* blurred, std::vector<uint8_t>* buffer) {
+  DS_CHECK(image.size() == blurred->size() && image.type() == CV_8UC1 && blurred->type() == CV_8UC1,
+           "{}x{} {}x{}", image.cols, image.rows, blurred->cols, blurred->rows);
+  const int width = image.cols;
+  if (width < 7 || image.rows < 7) return;
+  if (buffer->size() < static_cast<size_t>(width)) buffer->resize(width);
+  uint8_t* row = buffer->data();
+  for (int y = 3; y < image.rows - 3; ++y) {
+    WeightSeven(image.ptr<uint8_t>(y - 3), image.ptr<uint8_t>(y - 2), image.ptr<uint8_t>(y - 1),
+                image.ptr<uint8_t>(y), image.ptr<uint8_t>(y + 1), image.ptr<uint8_t>(y + 2),
+                image.ptr<uint8_t>(y + 3), width, row);
+    WeightSeven(row, row + 1, row + 2, row + 3, row + 4, row + 5, row + 6, width - 6,
+                blurred->ptr<uint8_t>(y) + 3);
+  }
+}
+
+}  // namespace dynamic_slam

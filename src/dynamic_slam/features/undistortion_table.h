@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "dynamic_slam/geometry/camera.h"
+
+namespace dynamic_slam {
+
+// Camera::Undistort from a table, for the many keypoints of each frame: the shift from raw to ideal px every
+// 4 px, linear in between. Within 0.01 px of the exact answer for lenses up to some 100 degrees.
+class UndistortionTable {
+ public:
+  explicit UndistortionTable(const Camera& camera);
+
+  // (x, y): raw px inside the image. Replaces it by the ideal px.
+  void Undistort(float* x, float* y) const;
+
+ private:
+  static constexpr int kStepPx = 4;
+  struct Shift {
+    float x, y;
+  };
+  int columns_ = 0;
+  std::vector<Shift> shifts_;  // empty without distortion
+};
+
+}  // namespace dynamic_slam
