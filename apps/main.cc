@@ -1,0 +1,38 @@
+#include <cstdio>
+#include <exception>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "cmd_eval.h"
+#include "dynamic_slam/base/error.h"
+
+namespace {
+
+// What the user can put right, and what only we can.
+constexpr int kExitBug = 1;
+constexpr int kExitInput = 2;
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Dynamic-SLAM: the path of one camera, and a map of what stands still around it",
+               "dynamic_slam");
+  app.set_version_flag("--version", "dynamic_slam " DYNAMIC_SLAM_VERSION);
+  app.require_subcommand(1);
+  dynamic_slam::AddEvalCommand(app);
+  try {
+    app.parse(argc, argv);  // runs the subcommand
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitInput;  // --help and --version end here with 0
+  } catch (const dynamic_slam::InputError& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return kExitInput;
+  } catch (const std::exception& error) {
+    fmt::print(stderr,
+               "internal error: {}\n  This is a bug: please report it with the command that you gave.\n",
+               error.what());
+    return kExitBug;
+  }
+}
