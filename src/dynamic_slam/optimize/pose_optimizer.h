@@ -68,9 +68,18 @@ class PoseOptimizer {
                 PoseEstimate* estimate);
 
  private:
+  // Copies the observations with an inlier flag into active_, padded to whole blocks; returns their number.
+  int Activate(const PoseObservations& all, const std::vector<uint8_t>& is_inlier);
+
+  // Takes Levenberg-Marquardt steps on active_ until they are small. False: the geometry is degenerate.
+  bool Descend(bool robust, Rigid3* cam_from_world) const;
+
+  // Names the inliers among all observations at this pose and counts them; true if a flag changed.
+  bool Classify(const PoseObservations& all, PoseEstimate* estimate) const;
+
   double fx_, fy_, cx_, cy_;  // px
   PoseOptimizerOptions options_;
-  std::vector<double> active_weight_;  // weight of each observation in this round, 0 for an outlier
+  PoseObservations active_;
 };
 
 }  // namespace dynamic_slam

@@ -1,0 +1,254 @@
+#include "dynamic_slam/optimize/pose_optimizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "dynamic_slam/base/error.h"
+
+namespace dynamic_slam {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr int kLanes = 4;  // observations in a block: sums stay apart per lane, so the compiler may vectorise
+constexpr int kMinPoints = 3;
+constexpr double kMinDepth = 1e-9;  // of a point in front of the camera, in units of the map
+
+// A round ends when the Newton decrement falls below this: the squared length of the step in standard
+// deviations of the pose, which does not depend on the scale of the map.
+constexpr double kSmallDecrement = 1e-6;
+
+// The Gauss-Newton system at one pose. cost = sum of weight * rho(error^2), in squared sigmas.
+struct NormalEquations {
+  Matrix6 hessian;
+  Vector6 gradient;
+  double cost;
+};
+
+// Sums J^T W J, J^T W r and the cost of Eq. (10) over observations, whose number is a multiple of kLanes.
+// `delta_squared` is the squared error at which the Huber kernel becomes linear (infinity: no kernel).
+void Accumulate(const PoseObservations& o, const Rigid3& cam_from_world, double fx, double fy, double cx,
+                double cy, double delta_squared, NormalEquations* out) {
+  const Eigen::Matrix3d R = cam_from_world.Matrix();
+  const Eigen::Vector3d t = cam_from_world.translation;
+  const double delta = std::sqrt(delta_squared);
+  double hessian[21][kLanes] = {};
+  double gradient[6][kLanes] = {};
+  double cost[kLanes] = {};
+
+  for (size_t begin = 0; begin < o.size(); begin += kLanes) {
+    double ju[6][kLanes], jv[6][kLanes], ru[kLanes], rv[kLanes], w[kLanes];
+    for (int k = 0; k < kLanes; ++k) {
+      const size_t i = begin + k;
+      const double x = R(0, 0) * o.x[i] + R(0, 1) * o.y[i] + R(0, 2) * o.z[i] + t[0];
+      const double y = R(1, 0) * o.x[i] + R(1, 1) * o.y[i] + R(1, 2) * o.z[i] + t[1];
+      const double z = R(2, 0) * o.x[i] + R(2, 1) * o.y[i] + R(2, 2) * o.z[i] + t[2];
+      const bool in_front = z > kMinDepth;
+      const double inverse_z = 1.0 / (in_front ? z : 1.0);
+      const double a = x * inverse_z;
+      const double b = y * inverse_z;
+      const double su = fx * o.inverse_sigma_px[i];
+      const double sv = fy * o.inverse_sigma_px[i];
+      ru[k] = su * a + (cx - o.u[i]) * o.inverse_sigma_px[i];
+      rv[k] = sv * b + (cy - o.v[i]) * o.inverse_sigma_px[i];
+      // d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
+      ju[0][k] = -su * a * b;
+      ju[1][k] = su * (1.0 + a * a);
+      ju[2][k] = -su * b;
+      ju[3][k] = su * inverse_z;
+      ju[4][k] = 0.0;
+      ju[5][k] = -su * a * inverse_z;
+      jv[0][k] = -sv * (1.0 + b * b);
+      jv[1][k] = sv * a * b;
+      jv[2][k] = sv * a;
+      jv[3][k] = 0.0;
+      jv[4][k] = sv * inverse_z;
+      jv[5][k] = -sv * b * inverse_z;
+      // A point that a step takes behind the camera has no derivative; it counts as one focal length of
+      // error, so that leaving the view is no way to lower the cost.
+      const double e2 = in_front ? ru[k] * ru[k] + rv[k] * rv[k] : su * su;
+      const double e = std::sqrt(std::max(e2, 1e-300));
+      const bool linear = e2 > delta_squared;
+      const double rho = linear ? 2.0 * delta * e - delta_squared : e2;
+      const double slope = linear ? delta / e : 1.0;
+      cost[k] += o.weight[i] * rho;
+      w[k] = in_front ? o.weight[i] * slope : 0.0;
+    }
+    int entry = 0;
+    for (int row = 0; row < 6; ++row) {
+      double wu[kLanes], wv[kLanes];
+      for (int k = 0; k < kLanes; ++k) {
+        wu[k] = w[k] * ju[row][k];
+        wv[k] = w[k] * jv[row][k];
+        gradient[row][k] += wu[k] * ru[k] + wv[k] * rv[k];
+      }
+      for (int col = row; col < 6; ++col, ++entry) {
+        for (int k = 0; k < kLanes; ++k) hessian[entry][k] += wu[k] * ju[col][k] + wv[k] * jv[col][k];
+      }
+    }
+  }
+
+  const auto sum = [](const double* lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); };
+  int entry = 0;
+  for (int row = 0; row < 6; ++row) {
+    out->gradient[row] = sum(gradient[row]);
+    for (int col = row; col < 6; ++col, ++entry) {
+      out->hessian(row, col) = out->hessian(col, row) = sum(hessian[entry]);
+    }
+  }
+  out->cost = sum(cost);
+}
+
+// Solves (H + damping * diag(H)) step = -g. False when H is singular: the points do not determine the pose.
+bool SolveStep(const NormalEquations& normal, double damping, Vector6* step) {
+  // Scaled to a unit diagonal, rotation and translation become comparable whatever the unit of the map.
+  const Vector6 diagonal = normal.hessian.diagonal();
+  if (!(diagonal.minCoeff() > 0) || !diagonal.allFinite()) return false;
+  const Vector6 scale = diagonal.cwiseSqrt().cwiseInverse();
+  Matrix6 scaled = scale.asDiagonal() * normal.hessian * scale.asDiagonal();
+  scaled.diagonal().array() += damping;
+  const Eigen::LDLT<Matrix6> ldlt(scaled);
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-12)) return false;
+  *step = -scale.cwiseProduct(ldlt.solve(scale.cwiseProduct(normal.gradient)));
+  return step->allFinite();
+}
+
+bool IsUsable(const PoseObservations& o, size_t i) {
+  const double sum = o.x[i] + o.y[i] + o.z[i] + o.u[i] + o.v[i];
+  return std::isfinite(sum) && o.weight[i] > 0 && std::isfinite(o.weight[i]) && o.inverse_sigma_px[i] > 0 &&
+         std::isfinite(o.inverse_sigma_px[i]);
+}
+
+}  // namespace
+
+void PoseObservations::Clear() {
+  for (std::vector<double>* array : {&x, &y, &z, &u, &v, &inverse_sigma_px, &weight}) array->clear();
+}
+
+void PoseObservations::Add(const Eigen::Vector3d& x_in_world, const Eigen::Vector2d& ideal_px,
+                           double inverse_sigma, double trust) {
+  x.push_back(x_in_world.x());
+  y.push_back(x_in_world.y());
+  z.push_back(x_in_world.z());
+  u.push_back(ideal_px.x());
+  v.push_back(ideal_px.y());
+  inverse_sigma_px.push_back(inverse_sigma);
+  weight.push_back(trust);
+}
+
+PoseOptimizer::PoseOptimizer(const Camera& camera, const PoseOptimizerOptions& options)
+    : fx_(camera.fx), fy_(camera.fy), cx_(camera.cx), cy_(camera.cy), options_(options) {}
+
+void PoseOptimizer::Optimize(const PoseObservations& observations, const Rigid3& initial_cam_from_world,
+                             PoseEstimate* estimate) {
+  DS_CHECK(estimate != nullptr);
+  const auto give_up = [&] {
+    estimate->cam_from_world = initial_cam_from_world;
+    estimate->inliers = 0;
+    estimate->is_inlier.assign(observations.size(), 0);
+    estimate->rms_px = 0;
+    estimate->information.setZero();
+    estimate->converged = false;
+  };
+  give_up();
+  if (!initial_cam_from_world.IsFinite()) return;
+
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const Eigen::Vector3d x_in_world(observations.x[i], observations.y[i], observations.z[i]);
+    estimate->is_inlier[i] =
+        IsUsable(observations, i) && (initial_cam_from_world * x_in_world).z() > kMinDepth;
+  }
+
+  const int rounds = options_.robust_rounds + options_.plain_rounds;
+  for (int round = 0; round < rounds; ++round) {
+    const bool robust = round < options_.robust_rounds;
+    if (Activate(observations, estimate->is_inlier) < kMinPoints ||
+        !Descend(robust, &estimate->cam_from_world)) {
+      return give_up();
+    }
+    const bool changed = Classify(observations, estimate);
+    if (!changed && !robust) break;  // another round would find the same pose
+  }
+
+  NormalEquations normal;
+  Vector6 unused_step;
+  if (Activate(observations, estimate->is_inlier) < kMinPoints) return give_up();
+  Accumulate(active_, estimate->cam_from_world, fx_, fy_, cx_, cy_, std::numeric_limits<double>::infinity(),
+             &normal);
+  if (!SolveStep(normal, 0.0, &unused_step)) return give_up();
+  estimate->information = normal.hessian;
+  estimate->converged = true;
+}
+
+int PoseOptimizer::Activate(const PoseObservations& all, const std::vector<uint8_t>& is_inlier) {
+  active_.Clear();
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (is_inlier[i]) {
+      active_.Add({all.x[i], all.y[i], all.z[i]}, {all.u[i], all.v[i]}, all.inverse_sigma_px[i],
+                  all.weight[i]);
+    }
+  }
+  const int count = static_cast<int>(active_.size());
+  while (active_.size() % kLanes != 0) {
+    active_.Add({active_.x[0], active_.y[0], active_.z[0]}, {active_.u[0], active_.v[0]}, 1.0, 0.0);
+  }
+  return count;
+}
+
+bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
+  const double delta_squared = robust ? options_.chi2 : std::numeric_limits<double>::infinity();
+  NormalEquations current, next;
+  Accumulate(active_, *cam_from_world, fx_, fy_, cx_, cy_, delta_squared, &current);
+  if (!std::isfinite(current.cost)) return false;
+  double damping = 0;  // Gauss-Newton while it works, Levenberg-Marquardt when it does not
+  for (int iteration = 0; iteration < options_.iterations_per_round; ++iteration) {
+    Vector6 step;
+    if (!SolveStep(current, damping, &step)) {
+      if (damping == 0) return false;
+      damping *= 10;
+      continue;
+    }
+    const Rigid3 candidate = Rigid3(ExpSo3(step.head<3>()), step.tail<3>()) * *cam_from_world;
+    Accumulate(active_, candidate, fx_, fy_, cx_, cy_, delta_squared, &next);
+    const double decrement = -step.dot(current.gradient);
+    if (next.cost <= current.cost) {  // false for NaN
+      *cam_from_world = candidate;
+      current = next;
+      damping = damping > 1e-6 ? 0.1 * damping : 0;
+    } else {
+      damping = std::max(1e-4, 10 * damping);
+    }
+    if (decrement < kSmallDecrement) break;
+  }
+  return true;
+}
+
+bool PoseOptimizer::Classify(const PoseObservations& all, PoseEstimate* estimate) const {
+  const Eigen::Matrix3d R = estimate->cam_from_world.Matrix();
+  const Eigen::Vector3d t = estimate->cam_from_world.translation;
+  int inliers = 0;
+  double sum = 0;
+  bool changed = false;
+  for (size_t i = 0; i < all.size(); ++i) {
+    const Eigen::Vector3d x_in_cam = R * Eigen::Vector3d(all.x[i], all.y[i], all.z[i]) + t;
+    const double du = fx_ * x_in_cam.x() / x_in_cam.z() + cx_ - all.u[i];
+    const double dv = fy_ * x_in_cam.y() / x_in_cam.z() + cy_ - all.v[i];
+    const double e2 = (du * du + dv * dv) * all.inverse_sigma_px[i] * all.inverse_sigma_px[i];
+    const bool inlier = x_in_cam.z() > kMinDepth && e2 <= options_.chi2 && IsUsable(all, i);
+    changed |= inlier != (estimate->is_inlier[i] != 0);
+    estimate->is_inlier[i] = inlier;
+    if (inlier) {
+      ++inliers;
+      sum += e2;
+    }
+  }
+  estimate->inliers = inliers;
+  estimate->rms_px = inliers > 0 ? std::sqrt(sum / inliers) : 0;
+  return changed;
+}
+
+}  // namespace dynamic_slam
