@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vector>
+
+#include "dynamic_slam/base/ids.h"
+#include "dynamic_slam/features/features.h"
+#include "dynamic_slam/features/keypoint_grid.h"
+#include "dynamic_slam/geometry/rigid3.h"
+
+namespace dynamic_slam {
+
+// One image as tracking sees it.
+struct Frame {
+  FrameId id;
+  double timestamp_s = 0;
+  FeatureSet features;
+  KeypointGrid grid;
+  std::vector<LandmarkId> landmarks;    // of each keypoint; not valid where there is none
+  std::vector<Eigen::Vector3d> points;  // where that landmark was in the world when it was matched
+  Rigid3 cam_from_world;
+  KeyframeId reference;       // the keyframe that shares most landmarks with it
+  Rigid3 cam_from_reference;  // outlives changes of the map, which cam_from_world does not
+
+  void ClearLandmarks() {
+    landmarks.assign(features.size(), LandmarkId());
+    points.resize(features.size());
+  }
+};
+
+class Map;
+
+// Makes the frame a keyframe that sees the frame's landmarks.
+KeyframeId InsertKeyframe(const Frame& frame, Map* map);
+
+}  // namespace dynamic_slam

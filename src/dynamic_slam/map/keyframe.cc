@@ -1,0 +1,36 @@
+#include "dynamic_slam/map/keyframe.h"
+
+#include <algorithm>
+
+#include "dynamic_slam/base/error.h"
+
+namespace dynamic_slam {
+
+std::vector<CovisibleKeyframe> Keyframe::BestCovisible(size_t count, int min_weight) const {
+  std::vector<CovisibleKeyframe> best;
+  for (const CovisibleKeyframe& other : covisible_) {
+    if (other.weight >= min_weight) best.push_back(other);
+  }
+  // Among equals the younger keyframe: it is the nearer in time.
+  std::sort(best.begin(), best.end(), [](const CovisibleKeyframe& a, const CovisibleKeyframe& b) {
+    return a.weight != b.weight ? a.weight > b.weight : a.id > b.id;
+  });
+  if (best.size() > count) best.resize(count);
+  return best;
+}
+
+void Keyframe::ChangeWeight(KeyframeId other, int change) {
+  const auto position =
+      std::lower_bound(covisible_.begin(), covisible_.end(), other,
+                       [](const CovisibleKeyframe& entry, KeyframeId id) { return entry.id < id; });
+  if (position == covisible_.end() || position->id != other) {
+    DS_CHECK(change > 0, "keyframe {} other {} change {}", id_.value(), other.value(), change);
+    covisible_.insert(position, {other, change});
+    return;
+  }
+  position->weight += change;
+  DS_CHECK(position->weight >= 0, "keyframe {} other {}", id_.value(), other.value());
+  if (position->weight == 0) covisible_.erase(position);
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dynamic_slam/base/ids.h"
+#include "dynamic_slam/features/features.h"
+#include "dynamic_slam/features/keypoint_grid.h"
+#include "dynamic_slam/geometry/rigid3.h"
+
+namespace dynamic_slam {
+
+// Another keyframe that sees `weight` of the same landmarks.
+struct CovisibleKeyframe {
+  KeyframeId id;
+  int weight = 0;
+};
+
+// An image that stays in the map. Its links to landmarks and other keyframes are made by Map alone.
+class Keyframe {
+ public:
+  Keyframe(KeyframeId id, FrameId frame_id, double timestamp_s, const Rigid3& cam_from_world,
+           FeatureSet features, KeypointGrid grid)
+      : id_(id),
+        frame_id_(frame_id),
+        timestamp_s_(timestamp_s),
+        cam_from_world_(cam_from_world),
+        features_(std::move(features)),
+        grid_(std::move(grid)),
+        landmarks_(features_.size()) {}
+
+  KeyframeId id() const { return id_; }
+  FrameId frame_id() const { return frame_id_; }
+  double timestamp_s() const { return timestamp_s_; }
+
+  const Rigid3& cam_from_world() const { return cam_from_world_; }
+  void set_cam_from_world(const Rigid3& cam_from_world) { cam_from_world_ = cam_from_world; }
+  Eigen::Vector3d CenterInWorld() const { return cam_from_world_.TargetOriginInSource(); }
+
+  const FeatureSet& features() const { return features_; }
+  const Keypoint& keypoint(uint32_t index) const { return features_.keypoints[index]; }
+  const KeypointGrid& grid() const { return grid_; }
+
+  // The landmark of each keypoint; not valid where there is none.
+  const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
+  int LandmarkCount() const { return landmark_count_; }
+
+  // Keyframes that share landmarks, by id.
+  const std::vector<CovisibleKeyframe>& covisible() const { return covisible_; }
+
+  // At most `count` keyframes with at least `min_weight` shared landmarks, the most shared first.
+  std::vector<CovisibleKeyframe> BestCovisible(size_t count, int min_weight = 1) const;
+
+ private:
+  friend class Map;
+  void ChangeWeight(KeyframeId other, int change);
+
+  KeyframeId id_;
+  FrameId frame_id_;
+  double timestamp_s_;
+  Rigid3 cam_from_world_;
+  FeatureSet features_;
+  KeypointGrid grid_;
+  std::vector<LandmarkId> landmarks_;
+  int landmark_count_ = 0;
+  std::vector<CovisibleKeyframe> covisible_;
+};
+
+}  // namespace dynamic_slam

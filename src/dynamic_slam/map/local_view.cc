@@ -1,0 +1,69 @@
+#include "dynamic_slam/map/local_view.h"
+
+#include <algorithm>
+
+namespace dynamic_slam {
+namespace {
+
+// Neighbours taken from each keyframe that sees the frame's landmarks.
+constexpr size_t kNeighbours = 10;
+
+}  // namespace
+
+void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes,
+                             LocalView* view) {
+  view->ids.clear();
+  view->positions.clear();
+  view->normals.clear();
+  view->min_distances.clear();
+  view->max_distances.clear();
+  view->descriptors.clear();
+  view->reference = KeyframeId();
+
+  votes_.assign(map.keyframes().CreatedCount(), 0);
+  for (const LandmarkId id : seen) {
+    const Landmark* landmark = map.landmarks().Find(id);
+    if (landmark == nullptr) continue;
+    for (const Observation& observation : landmark->observations()) ++votes_[observation.keyframe.value()];
+  }
+  keyframes_.clear();
+  int most_votes = 0;
+  for (uint32_t i = 0; i < votes_.size(); ++i) {
+    if (votes_[i] == 0) continue;
+    keyframes_.emplace_back(i);
+    if (votes_[i] >= most_votes) {  // the younger among equals
+      most_votes = votes_[i];
+      view->reference = KeyframeId(i);
+    }
+  }
+  const size_t limit = static_cast<size_t>(max_keyframes);
+  std::stable_sort(keyframes_.begin(), keyframes_.end(),
+                   [this](KeyframeId a, KeyframeId b) { return votes_[a.value()] > votes_[b.value()]; });
+  if (keyframes_.size() > limit) keyframes_.resize(limit);
+  const size_t direct = keyframes_.size();
+  for (size_t i = 0; i < direct && keyframes_.size() < limit; ++i) {
+    for (const CovisibleKeyframe& other : map.keyframes().At(keyframes_[i]).BestCovisible(kNeighbours)) {
+      if (votes_[other.id.value()] != 0 || keyframes_.size() >= limit) continue;
+      votes_[other.id.value()] = -1;  // taken
+      keyframes_.push_back(other.id);
+    }
+  }
+
+  ++build_;
+  visited_by_.resize(map.landmarks().CreatedCount(), 0);
+  for (const KeyframeId keyframe : keyframes_) {
+    for (const LandmarkId id : map.keyframes().At(keyframe).landmarks()) {
+      if (!id.IsValid() || visited_by_[id.value()] == build_) continue;
+      visited_by_[id.value()] = build_;
+      const Landmark& landmark = map.landmarks().At(id);
+      view->ids.push_back(id);
+      view->positions.push_back(landmark.position());
+      view->normals.push_back(landmark.normal());
+      view->min_distances.push_back(landmark.min_distance());
+      view->max_distances.push_back(landmark.max_distance());
+      view->descriptors.push_back(landmark.descriptor());
+    }
+  }
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,230 @@
+#include "dynamic_slam/map/map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "dynamic_slam/base/error.h"
+
+namespace dynamic_slam {
+namespace {
+
+auto FindObservation(const std::vector<Observation>& observations, KeyframeId keyframe) {
+  return std::lower_bound(observations.begin(), observations.end(), keyframe,
+                          [](const Observation& observation, KeyframeId id) { return observation.keyframe < id; });
+}
+
+}  // namespace
+
+bool Landmark::IsSeenBy(KeyframeId keyframe) const {
+  const auto position = FindObservation(observations_, keyframe);
+  return position != observations_.end() && position->keyframe == keyframe;
+}
+
+void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id) {
+  Keyframe& keyframe = keyframes_.At(keyframe_id);
+  Landmark& landmark = landmarks_.At(landmark_id);
+  DS_CHECK(keypoint < keyframe.landmarks_.size(), "keypoint={}", keypoint);
+  DS_CHECK(!keyframe.landmarks_[keypoint].IsValid(), "keyframe={} keypoint={}", keyframe_id.value(), keypoint);
+  const auto position = FindObservation(landmark.observations_, keyframe_id);
+  DS_CHECK(position == landmark.observations_.end() || position->keyframe != keyframe_id, "keyframe={} landmark={}",
+           keyframe_id.value(), landmark_id.value());
+  for (const Observation& other : landmark.observations_) {
+    keyframe.ChangeWeight(other.keyframe, 1);
+    keyframes_.At(other.keyframe).ChangeWeight(keyframe_id, 1);
+  }
+  landmark.observations_.insert(position, {keyframe_id, keypoint});
+  keyframe.landmarks_[keypoint] = landmark_id;
+  ++keyframe.landmark_count_;
+}
+
+void Map::Unlink(KeyframeId keyframe_id, uint32_t keypoint) {
+  Keyframe& keyframe = keyframes_.At(keyframe_id);
+  const LandmarkId landmark_id = keyframe.landmarks_.at(keypoint);
+  Landmark& landmark = landmarks_.At(landmark_id);
+  landmark.observations_.erase(FindObservation(landmark.observations_, keyframe_id));
+  keyframe.landmarks_[keypoint] = LandmarkId();
+  --keyframe.landmark_count_;
+  for (const Observation& other : landmark.observations_) {
+    keyframe.ChangeWeight(other.keyframe, -1);
+    keyframes_.At(other.keyframe).ChangeWeight(keyframe_id, -1);
+  }
+  if (landmark.observations_.size() < 2) EraseLandmark(landmark_id);
+}
+
+void Map::EraseLandmark(LandmarkId id) {
+  const std::vector<Observation> observations = std::move(landmarks_.At(id).observations_);
+  for (size_t i = 0; i < observations.size(); ++i) {
+    Keyframe& keyframe = keyframes_.At(observations[i].keyframe);
+    keyframe.landmarks_[observations[i].keypoint] = LandmarkId();
+    --keyframe.landmark_count_;
+    for (size_t j = 0; j < observations.size(); ++j) {
+      if (j != i) keyframe.ChangeWeight(observations[j].keyframe, -1);
+    }
+  }
+  landmarks_.Erase(id);
+}
+
+void Map::EraseKeyframe(KeyframeId id, KeyframeId heir) {
+  DS_CHECK(id != heir && keyframes_.Contains(heir), "id={} heir={}", id.value(), heir.value());
+  const std::vector<LandmarkId> landmarks = keyframes_.At(id).landmarks_;
+  for (uint32_t keypoint = 0; keypoint < landmarks.size(); ++keypoint) {
+    // A landmark may fall with an earlier link of this loop: look again.
+    if (keyframes_.At(id).landmarks_[keypoint].IsValid()) Unlink(id, keypoint);
+  }
+  if (heirs_.size() <= id.value()) heirs_.resize(id.value() + 1);
+  heirs_[id.value()] = {heir, keyframes_.At(id).cam_from_world() * keyframes_.At(heir).cam_from_world().Inverse()};
+  keyframes_.Erase(id);
+}
+
+void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {
+  DS_CHECK(from != into, "id={}", from.value());
+  const std::vector<Observation> observations = landmarks_.At(from).observations_;
+  const int found = landmarks_.At(from).found_count, visible = landmarks_.At(from).visible_count;
+  EraseLandmark(from);
+  Landmark& survivor = landmarks_.At(into);
+  for (const Observation& observation : observations) {
+    if (!survivor.IsSeenBy(observation.keyframe)) Link(observation.keyframe, observation.keypoint, into);
+  }
+  survivor.found_count += found;
+  survivor.visible_count += visible;
+  if (merged_into_.size() <= from.value()) merged_into_.resize(from.value() + 1);
+  merged_into_[from.value()] = into;
+  RefreshLandmark(into);
+}
+
+LandmarkId Map::Resolve(LandmarkId id) const {
+  while (id.IsValid() && !landmarks_.Contains(id)) {
+    id = id.value() < merged_into_.size() ? merged_into_[id.value()] : LandmarkId();
+  }
+  return id;
+}
+
+void Map::RefreshLandmark(LandmarkId id) {
+  Landmark& landmark = landmarks_.At(id);
+  const size_t count = landmark.observations_.size();
+  if (count == 0) return;
+
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double log_distance_sum = 0;
+  std::vector<const Descriptor*> descriptors;
+  descriptors.reserve(count);
+  for (const Observation& observation : landmark.observations_) {
+    const Keyframe& keyframe = keyframes_.At(observation.keyframe);
+    const Eigen::Vector3d direction = landmark.position_ - keyframe.CenterInWorld();
+    const double distance = direction.norm();
+    normal += direction / std::max(distance, 1e-12);
+    // Seen in octave o at this distance, it would be seen in octave 0 from `scale` times as far.
+    const float scale = octave_scales_[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];
+    log_distance_sum += std::log(std::max(distance, 1e-12) * scale);
+    descriptors.push_back(&keyframe.features().descriptors[observation.keypoint]);
+  }
+  landmark.normal_ = normal.normalized().cast<float>();
+  landmark.max_distance_ = static_cast<float>(std::exp(log_distance_sum / static_cast<double>(count)));
+  landmark.min_distance_ = landmark.max_distance_ / octave_scales_.back();
+
+  // The medoid: the descriptor with the least median distance to the others.
+  size_t best = 0;
+  int best_median = std::numeric_limits<int>::max();
+  std::vector<int> distances(count);
+  for (size_t i = 0; i < count && count > 2; ++i) {
+    for (size_t j = 0; j < count; ++j) distances[j] = HammingDistance(*descriptors[i], *descriptors[j]);
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>((count - 1) / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    if (*middle < best_median) {
+      best_median = *middle;
+      best = i;
+    }
+  }
+  landmark.descriptor_ = *descriptors[count > 2 ? best : count - 1];
+}
+
+Map::Anchor Map::ResolveKeyframe(KeyframeId id) const {
+  Anchor anchor{id, Rigid3()};
+  while (!keyframes_.Contains(anchor.keyframe)) {
+    DS_CHECK(anchor.keyframe.value() < heirs_.size(), "id={}", id.value());
+    const Anchor& heir = heirs_[anchor.keyframe.value()];
+    anchor = {heir.keyframe, anchor.original_from_keyframe * heir.original_from_keyframe};
+  }
+  return anchor;
+}
+
+Rigid3 Map::PoseFromReference(KeyframeId reference, const Rigid3& cam_from_reference) const {
+  const Anchor anchor = ResolveKeyframe(reference);
+  return cam_from_reference * anchor.original_from_keyframe * keyframes_.At(anchor.keyframe).cam_from_world();
+}
+
+double Map::MedianDepth(KeyframeId id) const {
+  const Keyframe& keyframe = keyframes_.At(id);
+  std::vector<double> depths;
+  for (const LandmarkId landmark : keyframe.landmarks()) {
+    if (landmark.IsValid()) depths.push_back((keyframe.cam_from_world() * landmarks_.At(landmark).position()).z());
+  }
+  if (depths.empty()) return 0;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+void Map::Scale(double factor) {
+  keyframes_.ForEach([factor](Keyframe& keyframe) { keyframe.cam_from_world_.translation *= factor; });
+  landmarks_.ForEach([factor](Landmark& landmark) { landmark.position_ *= factor; });
+  for (Anchor& heir : heirs_) heir.original_from_keyframe.translation *= factor;
+  landmarks_.ForEach([this](Landmark& landmark) { RefreshLandmark(landmark.id()); });
+}
+
+std::vector<std::string> Map::Validate() const {
+  std::vector<std::string> problems;
+  std::map<std::pair<KeyframeId, KeyframeId>, int> weights;
+  landmarks_.ForEach([&](const Landmark& landmark) {
+    const uint32_t id = landmark.id().value();
+    if (landmark.observations().size() < 2) problems.push_back(fmt::format("landmark {}: fewer than two observations", id));
+    if (!landmark.position().allFinite()) problems.push_back(fmt::format("landmark {}: position is not finite", id));
+    KeyframeId previous;
+    for (const Observation& observation : landmark.observations()) {
+      const Keyframe* keyframe = keyframes_.Find(observation.keyframe);
+      if (previous.IsValid() && observation.keyframe <= previous) {
+        problems.push_back(fmt::format("landmark {}: observations are not in the order of keyframes", id));
+      }
+      previous = observation.keyframe;
+      if (keyframe == nullptr || observation.keypoint >= keyframe->landmarks().size() ||
+          keyframe->landmarks()[observation.keypoint] != landmark.id()) {
+        problems.push_back(fmt::format("landmark {}: keyframe {} does not know of it", id, observation.keyframe.value()));
+      }
+      for (const Observation& other : landmark.observations()) {
+        if (other.keyframe != observation.keyframe) ++weights[{observation.keyframe, other.keyframe}];
+      }
+    }
+  });
+  keyframes_.ForEach([&](const Keyframe& keyframe) {
+    const uint32_t id = keyframe.id().value();
+    if (!keyframe.cam_from_world().IsFinite()) problems.push_back(fmt::format("keyframe {}: pose is not finite", id));
+    int count = 0;
+    for (uint32_t keypoint = 0; keypoint < keyframe.landmarks().size(); ++keypoint) {
+      const LandmarkId landmark_id = keyframe.landmarks()[keypoint];
+      if (!landmark_id.IsValid()) continue;
+      ++count;
+      const Landmark* landmark = landmarks_.Find(landmark_id);
+      if (landmark == nullptr || !landmark->IsSeenBy(keyframe.id())) {
+        problems.push_back(fmt::format("keyframe {}: keypoint {} links a landmark that does not link back", id, keypoint));
+      }
+    }
+    if (count != keyframe.LandmarkCount()) problems.push_back(fmt::format("keyframe {}: counts its landmarks wrongly", id));
+    for (const CovisibleKeyframe& other : keyframe.covisible()) {
+      const auto weight = weights.find({keyframe.id(), other.id});
+      if (weight == weights.end() || weight->second != other.weight) {
+        problems.push_back(fmt::format("keyframe {}: wrong covisibility with {}", id, other.id.value()));
+      } else {
+        weights.erase(weight);
+      }
+    }
+  });
+  for (const auto& [pair, weight] : weights) {
+    problems.push_back(fmt::format("keyframe {}: lacks covisibility with {}", pair.first.value(), pair.second.value()));
+  }
+  return problems;
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dynamic_slam/base/ids.h"
+#include "dynamic_slam/map/id_table.h"
+#include "dynamic_slam/map/keyframe.h"
+#include "dynamic_slam/map/landmark.h"
+
+namespace dynamic_slam {
+
+// Keyframes, landmarks and who sees what: the one object that the stages share.
+//
+// Each link between a keypoint and a landmark is kept on both sides, and each pair of keyframes knows how many
+// landmarks it shares; both hold after every call.
+class Map {
+ public:
+  // octave_scales: size of a pixel of each octave in full-resolution px (OrbExtractor::OctaveScales).
+  explicit Map(std::vector<float> octave_scales) : octave_scales_(std::move(octave_scales)) {}
+
+  Keyframe& AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world, FeatureSet features,
+                        KeypointGrid grid) {
+    return keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features), std::move(grid));
+  }
+
+  Landmark& AddLandmark(const Eigen::Vector3d& position, KeyframeId created_by) {
+    return landmarks_.Emplace(position, created_by);
+  }
+
+  // The keypoint must be free, and the keyframe must not see the landmark already.
+  void Link(KeyframeId keyframe, uint32_t keypoint, LandmarkId landmark);
+
+  // Removes the keypoint's link, and the landmark with it when fewer than two observations are left.
+  void Unlink(KeyframeId keyframe, uint32_t keypoint);
+
+  void EraseLandmark(LandmarkId id);
+
+  // Frames that hang on the keyframe hang on `heir` from now on, at the pose they have now.
+  void EraseKeyframe(KeyframeId id, KeyframeId heir);
+
+  // The landmark `from` is the same point as `into`: moves its observations and erases it.
+  void MergeLandmarks(LandmarkId from, LandmarkId into);
+
+  // What became of a landmark: itself, the one it was merged into, or not valid when it is gone.
+  LandmarkId Resolve(LandmarkId id) const;
+
+  // Recomputes normal, distances and descriptor from the observations.
+  void RefreshLandmark(LandmarkId id);
+
+  // The keyframe a frame hangs on now, and the pose of the one it was made with in it.
+  struct Anchor {
+    KeyframeId keyframe;
+    Rigid3 original_from_keyframe;
+  };
+  Anchor ResolveKeyframe(KeyframeId id) const;
+
+  // Pose of a frame that was tracked relative to `reference`, after all that has happened to the map since.
+  Rigid3 PoseFromReference(KeyframeId reference, const Rigid3& cam_from_reference) const;
+
+  const IdTable<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
+  IdTable<KeyframeId, Keyframe>& keyframes() { return keyframes_; }
+  const IdTable<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
+  IdTable<LandmarkId, Landmark>& landmarks() { return landmarks_; }
+  const std::vector<float>& octave_scales() const { return octave_scales_; }
+
+  // Median depth of the keyframe's landmarks in its camera; 0 when there are none.
+  double MedianDepth(KeyframeId id) const;
+
+  // Multiplies all lengths.
+  void Scale(double factor);
+
+  // Everything that is wrong with the map, recomputed from scratch; empty when nothing is.
+  std::vector<std::string> Validate() const;
+
+ private:
+  std::vector<float> octave_scales_;
+  IdTable<KeyframeId, Keyframe> keyframes_;
+  IdTable<LandmarkId, Landmark> landmarks_;
+  std::vector<LandmarkId> merged_into_;  // by landmark id; filled as far as needed
+  std::vector<Anchor> heirs_;            // by keyframe id; not valid while the keyframe lives
+};
+
+}  // namespace dynamic_slam

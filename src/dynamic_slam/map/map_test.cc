@@ -1,0 +1,196 @@
+#include "dynamic_slam/map/map.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/map/frame.h"
+#include "dynamic_slam/map/local_view.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+FeatureSet MakeFeatures(uint32_t count, uint64_t seed) {
+  Random random(seed);
+  FeatureSet features;
+  for (uint32_t i = 0; i < count; ++i) {
+    Keypoint keypoint;
+    keypoint.x = static_cast<float>(random.Uniform(0, 640));
+    keypoint.y = static_cast<float>(random.Uniform(0, 480));
+    keypoint.octave = static_cast<int>(random.Index(3));
+    features.keypoints.push_back(keypoint);
+    features.descriptors.push_back({random.Next(), random.Next(), random.Next(), random.Next()});
+  }
+  return features;
+}
+
+KeyframeId AddKeyframe(Map* map, uint32_t keypoints, const Rigid3& cam_from_world = {}) {
+  const uint32_t number = static_cast<uint32_t>(map->keyframes().CreatedCount());
+  return map->AddKeyframe(FrameId(number), number, cam_from_world, MakeFeatures(keypoints, number), KeypointGrid()).id();
+}
+
+Map MakeMap() { return Map({1.0f, 1.2f, 1.44f}); }
+
+LandmarkId AddLandmark(Map* map, const std::vector<Observation>& observations) {
+  const LandmarkId id = map->AddLandmark({0, 0, 2}, observations.back().keyframe).id();
+  for (const Observation& observation : observations) map->Link(observation.keyframe, observation.keypoint, id);
+  return id;
+}
+
+TEST(MapTest, CovisibilityFollowsTheLinks) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10);
+  AddLandmark(&map, {{a, 0}, {b, 0}});
+  const LandmarkId all = AddLandmark(&map, {{a, 1}, {b, 1}, {c, 1}});
+  const auto best = map.keyframes().At(a).BestCovisible(5);
+  ASSERT_EQ(best.size(), 2u);
+  EXPECT_EQ(best[0].id, b);
+  EXPECT_EQ(best[0].weight, 2);
+  EXPECT_EQ(best[1].id, c);
+  EXPECT_EQ(best[1].weight, 1);
+  map.Unlink(c, 1);
+  EXPECT_EQ(map.keyframes().At(a).BestCovisible(5).size(), 1u);
+  EXPECT_TRUE(map.landmarks().Contains(all));
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(MapTest, ALandmarkFallsWithItsLastButOneObservation) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10);
+  const LandmarkId id = AddLandmark(&map, {{a, 3}, {b, 4}});
+  map.Unlink(a, 3);
+  EXPECT_FALSE(map.landmarks().Contains(id));
+  EXPECT_FALSE(map.keyframes().At(b).landmarks()[4].IsValid());
+  EXPECT_EQ(map.keyframes().At(b).LandmarkCount(), 0);
+  EXPECT_FALSE(map.Resolve(id).IsValid());
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(MapTest, MergedLandmarksResolveToTheSurvivor) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10),
+                   d = AddKeyframe(&map, 10);
+  const LandmarkId first = AddLandmark(&map, {{a, 0}, {b, 0}});
+  const LandmarkId second = AddLandmark(&map, {{b, 1}, {c, 1}});
+  const LandmarkId third = AddLandmark(&map, {{c, 2}, {d, 2}});
+  map.MergeLandmarks(second, first);
+  map.MergeLandmarks(first, third);
+  EXPECT_EQ(map.Resolve(second), third);
+  EXPECT_EQ(map.Resolve(first), third);
+  // b saw the first and the second, c the second and the third: one link each stays.
+  EXPECT_EQ(map.landmarks().At(third).observations().size(), 4u);
+  EXPECT_FALSE(map.keyframes().At(b).landmarks()[1].IsValid());
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(MapTest, FramesOfAnErasedKeyframeKeepTheirPose) {
+  Map map = MakeMap();
+  const Rigid3 pose_a(ExpSo3({0.1, 0, 0}), {1, 0, 0}), pose_b(ExpSo3({0, 0.2, 0}), {0, 2, 0}),
+      pose_c(ExpSo3({0, 0, 0.3}), {0, 0, 3});
+  const KeyframeId a = AddKeyframe(&map, 4, pose_a), b = AddKeyframe(&map, 4, pose_b), c = AddKeyframe(&map, 4, pose_c);
+  AddLandmark(&map, {{a, 0}, {b, 0}, {c, 0}});
+  const Rigid3 cam_from_a(ExpSo3({0.05, 0.05, 0}), {0.1, 0.2, 0.3});
+  const Rigid3 before = map.PoseFromReference(a, cam_from_a);
+  map.EraseKeyframe(a, b);
+  map.EraseKeyframe(b, c);
+  const Rigid3 after = map.PoseFromReference(a, cam_from_a);
+  EXPECT_LT((before.translation - after.translation).norm(), 1e-12);
+  EXPECT_LT(RotationAngle(before.rotation, after.rotation), 1e-7);
+  EXPECT_EQ(map.ResolveKeyframe(a).keyframe, c);
+  EXPECT_EQ(map.landmarks().size(), 0u);
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(MapTest, RandomChangesKeepItValid) {
+  Map map = MakeMap();
+  Random random(5);
+  std::vector<KeyframeId> keyframes;
+  for (int i = 0; i < 8; ++i) keyframes.push_back(AddKeyframe(&map, 40));
+  for (int step = 0; step < 2000; ++step) {
+    const uint32_t keyframe = random.Index(8), keypoint = random.Index(40);
+    const uint32_t other = (keyframe + 1 + random.Index(7)) % 8, other_keypoint = random.Index(40);
+    const LandmarkId mine = map.keyframes().At(keyframes[keyframe]).landmarks()[keypoint];
+    const LandmarkId theirs = map.keyframes().At(keyframes[other]).landmarks()[other_keypoint];
+    if (!mine.IsValid() && !theirs.IsValid()) {
+      AddLandmark(&map, {{keyframes[keyframe], keypoint}, {keyframes[other], other_keypoint}});
+    } else if (mine.IsValid() && theirs.IsValid() && mine != theirs) {
+      map.MergeLandmarks(mine, theirs);
+    } else if (mine.IsValid() && step % 7 == 0) {
+      map.Unlink(keyframes[keyframe], keypoint);
+    } else if (mine.IsValid() && !theirs.IsValid() && !map.landmarks().At(mine).IsSeenBy(keyframes[other])) {
+      map.Link(keyframes[other], other_keypoint, mine);
+    }
+  }
+  EXPECT_GT(map.landmarks().size(), 5u);
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(MapTest, ValidateNamesAPoseThatIsNotFinite) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 4);
+  Rigid3 broken;
+  broken.translation.x() = std::nan("");
+  map.keyframes().At(a).set_cam_from_world(broken);
+  EXPECT_THAT(map.Validate(), ElementsAre("keyframe 0: pose is not finite"));
+}
+
+TEST(MapTest, LinkingAKeypointTwiceIsABug) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 4), b = AddKeyframe(&map, 4);
+  AddLandmark(&map, {{a, 0}, {b, 0}});
+  const LandmarkId other = map.AddLandmark({0, 0, 1}, a).id();
+  EXPECT_THROW(map.Link(a, 0, other), InternalError);
+}
+
+TEST(MapTest, ADistanceTellsTheOctave) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10);
+  const LandmarkId id = AddLandmark(&map, {{a, 0}, {b, 1}});
+  map.RefreshLandmark(id);
+  const Landmark& landmark = map.landmarks().At(id);
+  const double scale_a = map.octave_scales()[static_cast<size_t>(map.keyframes().At(a).keypoint(0).octave)];
+  const double scale_b = map.octave_scales()[static_cast<size_t>(map.keyframes().At(b).keypoint(1).octave)];
+  EXPECT_NEAR(landmark.max_distance(), 2 * std::sqrt(scale_a * scale_b), 1e-5);
+  EXPECT_NEAR(landmark.min_distance(), landmark.max_distance() / 1.44, 1e-5);
+  EXPECT_NEAR(landmark.normal().z(), 1, 1e-6);
+}
+
+TEST(LocalViewTest, HoldsWhatTheNeighboursSeeOnce) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10);
+  const LandmarkId seen = AddLandmark(&map, {{a, 0}, {b, 0}});
+  const LandmarkId near = AddLandmark(&map, {{a, 1}, {b, 1}});
+  const LandmarkId beyond = AddLandmark(&map, {{b, 2}, {c, 2}});
+  LocalView view;
+  LocalViewBuilder builder;
+  builder.Build(map, {LandmarkId(), seen, LandmarkId(77)}, 2, &view);
+  EXPECT_THAT(view.ids, testing::UnorderedElementsAre(seen, near, beyond));
+  EXPECT_EQ(view.reference, b) << "the younger of two with equal votes";
+  builder.Build(map, {}, 2, &view);
+  EXPECT_EQ(view.size(), 0u);
+  EXPECT_FALSE(view.reference.IsValid());
+}
+
+TEST(FrameTest, AMergedLandmarkIsLinkedOnce) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10);
+  const LandmarkId first = AddLandmark(&map, {{a, 0}, {b, 0}});
+  const LandmarkId second = AddLandmark(&map, {{b, 1}, {c, 1}});
+  Frame frame;
+  frame.id = FrameId(9);
+  frame.features = MakeFeatures(10, 9);
+  frame.ClearLandmarks();
+  frame.landmarks[4] = first;
+  frame.landmarks[5] = second;
+  map.MergeLandmarks(first, second);
+  const KeyframeId inserted = InsertKeyframe(frame, &map);
+  EXPECT_EQ(map.keyframes().At(inserted).LandmarkCount(), 1);
+  EXPECT_TRUE(map.landmarks().At(second).IsSeenBy(inserted));
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace dynamic_slam

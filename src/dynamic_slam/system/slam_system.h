@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/geometry/trajectory.h"
+#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/mapping/local_mapper.h"
+#include "dynamic_slam/system/system_options.h"
+#include "dynamic_slam/tracking/tracker.h"
+
+namespace dynamic_slam {
+
+// What became of one image, and how long it took.
+struct FrameResult {
+  FrameId id;
+  TrackingResult tracking;
+  double tracking_ms = 0;  // from the image in memory to its pose
+  double mapping_ms = 0;   // of the mapping that ran because of it
+};
+
+// Dynamic-SLAM in offline mode: every frame, one thread, one fixed order of the stages, so that the same images,
+// options and binary give the same map bit by bit.
+class SlamSystem {
+ public:
+  // Throws InputError when the camera or an option is out of range.
+  SlamSystem(const Camera& camera, const SystemOptions& options);
+
+  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of that size, not 0 where keypoints are forbidden.
+  FrameResult Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask = {});
+
+  // To be called once after the last image; adjusts the whole map. Poses and landmarks are final after it.
+  void Finish();
+
+  // The frames that have a pose, at where the map puts them now.
+  Trajectory FrameTrajectory() const;
+  Trajectory KeyframeTrajectory() const;
+
+  const Map& map() const { return map_; }
+  const Camera& camera() const { return camera_; }
+  const SystemOptions& options() const { return options_; }
+
+ private:
+  // Where a frame was, relative to a keyframe: survives whatever happens to the map.
+  struct TrackedFrame {
+    double timestamp_s;
+    KeyframeId reference;
+    Rigid3 cam_from_reference;
+  };
+
+  Camera camera_;
+  SystemOptions options_;
+  Map map_;
+  Tracker tracker_;
+  LocalMapper mapper_;
+  std::vector<TrackedFrame> tracked_;
+  uint32_t frame_count_ = 0;
+};
+
+}  // namespace dynamic_slam

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/features/matcher.h"
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/map/frame.h"
+#include "dynamic_slam/map/landmark_projector.h"
+#include "dynamic_slam/map/local_view.h"
+#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/optimize/pose_optimizer.h"
+#include "dynamic_slam/tracking/tracker_options.h"
+
+namespace dynamic_slam {
+
+// Finds a frame's pose from landmarks: matching, then Eq. (10). Each Track* leaves the pose and the landmarks that fit
+// it in the frame and returns their number.
+class PoseTracker {
+ public:
+  PoseTracker(const Camera& camera, const TrackerOptions& options, std::vector<float> octave_scales);
+
+  // Looks for the last frame's landmarks about where `predicted` puts them.
+  int TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_from_world, double radius_px, Frame* frame);
+
+  // Matches descriptors with the keyframe's and solves PnP: needs no idea of the pose.
+  int TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Random& random, Frame* frame);
+
+  // Looks for the view's landmarks that the frame does not have yet, and optimises the pose over all.
+  // in_view[i] becomes 1 when entry i should be visible in the frame at its pose before this call.
+  int TrackLocalMap(const LocalView& view, double radius_px, Frame* frame, std::vector<uint8_t>* in_view);
+
+ private:
+  // Optimises the pose over all the frame's landmarks from `initial`; takes away those that do not fit.
+  int OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame);
+
+  // Adds the matches that agree in rotation to the frame.
+  struct Candidate {
+    uint32_t keypoint;
+    LandmarkId landmark;
+    Eigen::Vector3d point;
+  };
+  void AcceptCandidates(Frame* frame);
+
+  Camera camera_;
+  TrackerOptions options_;
+  std::vector<float> octave_scales_;
+  LandmarkProjector projector_;
+  PoseOptimizer optimizer_;
+
+  // Kept between frames for their memory.
+  PoseObservations observations_;
+  PoseEstimate estimate_;
+  std::vector<uint32_t> observed_keypoints_;
+  std::vector<Candidate> candidates_;
+  std::vector<uint8_t> taken_;
+  std::vector<uint8_t> landmark_known_;
+  RotationConsistency rotation_;
+};
+
+}  // namespace dynamic_slam

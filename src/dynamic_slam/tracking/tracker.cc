@@ -1,0 +1,195 @@
+#include "dynamic_slam/tracking/tracker.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace dynamic_slam {
+namespace {
+
+// When the motion model fails the camera may have jerked: look this much farther once more.
+constexpr double kWideSearch = 3.0;
+
+// A pose that comes from descriptors alone is less exact than a prediction.
+constexpr double kRelocalisedSearch = 3.0;
+
+}  // namespace
+
+const char* Name(TrackingState state) {
+  switch (state) {
+    case TrackingState::kInitialising:
+      return "initialising";
+    case TrackingState::kTracking:
+      return "tracking";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "";
+}
+
+Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed, Map* map)
+    : camera_(camera),
+      orb_options_(orb),
+      options_(options),
+      map_(map),
+      bounds_(camera.IdealBounds()),
+      extractor_(orb, camera),
+      initializer_(camera, options.initializer),
+      pose_tracker_(camera, options, map->octave_scales()),
+      random_(seed) {}
+
+TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
+  std::swap(frame_, last_);
+  frame_.id = id;
+  frame_.timestamp_s = timestamp_s;
+  const double factor = state_ == TrackingState::kInitialising ? options_.initializer.feature_factor : 1.0;
+  extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
+  extractor_.Extract(grey, mask, &frame_.features);
+  frame_.grid.Build(frame_.features, bounds_);
+  frame_.ClearLandmarks();
+  frame_.reference = last_.reference;
+  inliers_ = 0;
+  reason_.clear();
+
+  TrackingResult result;
+  result.keypoints = static_cast<int>(frame_.features.size());
+  if (state_ == TrackingState::kInitialising) {
+    Initialise(&result);
+  } else {
+    const bool tracked = (last_has_pose_ && TrackFrame()) || Relocalise();
+    state_ = tracked ? TrackingState::kTracking : TrackingState::kLost;
+    if (tracked) {
+      lost_frames_ = 0;
+      CountVisibility();
+      frame_.reference = view_.reference;
+      frame_.cam_from_reference =
+          frame_.cam_from_world * map_->keyframes().At(frame_.reference).cam_from_world().Inverse();
+      velocity_ = last_has_pose_ ? std::optional<Rigid3>(frame_.cam_from_world * last_.cam_from_world.Inverse())
+                                 : std::nullopt;
+      InsertKeyframeIfDue(&result);
+    } else {
+      velocity_.reset();
+      ++lost_frames_;
+      GiveUpSmallMap(&result);
+    }
+    last_has_pose_ = tracked;
+  }
+  result.state = state_;
+  result.inliers = inliers_;
+  result.reason = reason_;
+  return result;
+}
+
+void Tracker::Initialise(TrackingResult* result) {
+  const bool succeeded = initializer_.TryFrame(&frame_, random_, map_);
+  reason_ = initializer_.reason();
+  if (!succeeded) return;
+  state_ = TrackingState::kTracking;
+  last_has_pose_ = true;
+  velocity_.reset();
+  initializer_.Reset();
+  last_keyframe_ = frame_.reference;
+  last_keyframe_frame_ = frame_.id;
+  inliers_ = map_->keyframes().At(last_keyframe_).LandmarkCount();
+  map_->keyframes().ForEach([result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
+}
+
+// Local mapping may have moved, merged or erased what the last frame saw, and added to it.
+void Tracker::RefreshLastFrame() {
+  last_.cam_from_world = map_->PoseFromReference(last_.reference, last_.cam_from_reference);
+  const Keyframe* keyframe = map_->keyframes().Find(last_keyframe_);
+  if (keyframe != nullptr && keyframe->frame_id() == last_.id) last_.landmarks = keyframe->landmarks();
+  for (size_t i = 0; i < last_.landmarks.size(); ++i) {
+    if (!last_.landmarks[i].IsValid()) continue;
+    last_.landmarks[i] = map_->Resolve(last_.landmarks[i]);
+    if (last_.landmarks[i].IsValid()) last_.points[i] = map_->landmarks().At(last_.landmarks[i]).position();
+  }
+}
+
+bool Tracker::TrackFrame() {
+  RefreshLastFrame();
+  const Rigid3 predicted = velocity_.has_value() ? *velocity_ * last_.cam_from_world : last_.cam_from_world;
+  int inliers = pose_tracker_.TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
+  if (inliers < options_.min_motion_inliers) {
+    inliers = pose_tracker_.TrackFromFrame(last_, last_.cam_from_world, kWideSearch * options_.motion_radius_px, &frame_);
+  }
+  if (inliers < options_.min_motion_inliers) {
+    reason_ = fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
+    return false;
+  }
+  return TrackLocalMap(options_.local_map_radius_px, options_.min_inliers);
+}
+
+bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
+  view_builder_.Build(*map_, frame_.landmarks, options_.local_keyframes, &view_);
+  if (!view_.reference.IsValid()) return false;
+  inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px, &frame_, &in_view_);
+  if (inliers_ >= min_inliers) return true;
+  reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
+  return false;
+}
+
+// The youngest keyframes first: the camera was there a moment ago.
+bool Tracker::Relocalise() {
+  std::vector<KeyframeId> candidates;
+  map_->keyframes().ForEach([&candidates](const Keyframe& keyframe) { candidates.push_back(keyframe.id()); });
+  const size_t count = std::min(candidates.size(), static_cast<size_t>(options_.relocalisation_keyframes));
+  const std::string why_lost = reason_;
+  for (size_t i = 0; i < count; ++i) {
+    const Keyframe& keyframe = map_->keyframes().At(candidates[candidates.size() - 1 - i]);
+    if (pose_tracker_.TrackFromKeyframe(*map_, keyframe, random_, &frame_) < options_.pnp.min_inliers) continue;
+    if (!TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, options_.min_inliers)) continue;
+    // Once more from the better pose, with the narrow window.
+    if (TrackLocalMap(options_.local_map_radius_px, options_.min_relocalisation_inliers)) {
+      reason_ = fmt::format("found again by keyframe {}", keyframe.id().value());
+      return true;
+    }
+  }
+  frame_.ClearLandmarks();
+  inliers_ = 0;
+  reason_ = fmt::format("{}; none of {} keyframes matches the image",
+                        why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost, count);
+  return false;
+}
+
+void Tracker::CountVisibility() {
+  for (size_t i = 0; i < view_.size(); ++i) {
+    if (in_view_[i] != 0) ++map_->landmarks().At(view_.ids[i]).visible_count;
+  }
+  for (const LandmarkId id : frame_.landmarks) {
+    if (id.IsValid()) ++map_->landmarks().At(id).found_count;
+  }
+}
+
+void Tracker::InsertKeyframeIfDue(TrackingResult* result) {
+  // While the map is young its landmarks have few observations.
+  const size_t well_observed = map_->keyframes().size() <= 2 ? 2 : 3;
+  KeyframePolicyInput input;
+  input.frames_since_keyframe = static_cast<int>(frame_.id.value() - last_keyframe_frame_.value());
+  input.inliers = inliers_;
+  for (const LandmarkId id : map_->keyframes().At(frame_.reference).landmarks()) {
+    if (id.IsValid() && map_->landmarks().At(id).observations().size() >= well_observed) ++input.reference_landmarks;
+  }
+  result->keyframe_reason = DecideKeyframe(input, options_.keyframe);
+  if (result->keyframe_reason == KeyframeReason::kNone) return;
+  last_keyframe_ = InsertKeyframe(frame_, map_);
+  last_keyframe_frame_ = frame_.id;
+  frame_.reference = last_keyframe_;
+  frame_.cam_from_reference = Rigid3();
+  result->new_keyframes.push_back(last_keyframe_);
+}
+
+// A map that lost the camera so soon was probably wrong from the start.
+void Tracker::GiveUpSmallMap(TrackingResult* result) {
+  if (static_cast<int>(map_->keyframes().size()) > options_.reset_keyframes ||
+      lost_frames_ < options_.reset_after_frames) {
+    return;
+  }
+  reason_ = fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_,
+                        map_->keyframes().size());
+  *map_ = Map(map_->octave_scales());
+  state_ = TrackingState::kInitialising;
+  result->map_was_reset = true;
+  lost_frames_ = 0;
+}
+
+}  // namespace dynamic_slam

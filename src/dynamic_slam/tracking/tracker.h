@@ -1,0 +1,87 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/features/orb_extractor.h"
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/map/frame.h"
+#include "dynamic_slam/map/local_view.h"
+#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/tracking/initializer.h"
+#include "dynamic_slam/tracking/keyframe_policy.h"
+#include "dynamic_slam/tracking/pose_tracker.h"
+#include "dynamic_slam/tracking/tracker_options.h"
+
+namespace dynamic_slam {
+
+enum class TrackingState {
+  kInitialising,  // there is no map yet
+  kTracking,
+  kLost,          // there is a map, and no pose in it
+};
+
+const char* Name(TrackingState state);
+
+// What became of one image.
+struct TrackingResult {
+  TrackingState state = TrackingState::kInitialising;
+  std::string reason;  // one sentence with its number; empty while all is well
+  int keypoints = 0;
+  int inliers = 0;     // landmarks that fit the pose
+  KeyframeReason keyframe_reason = KeyframeReason::kNone;
+  std::vector<KeyframeId> new_keyframes;  // inserted into the map, waiting for local mapping
+  bool map_was_reset = false;
+};
+
+// From images to poses: a state machine over initialisation, tracking and being lost. Synchronous; the map belongs to
+// it during Track().
+class Tracker {
+ public:
+  Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed, Map* map);
+
+  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden (Eq. 11).
+  TrackingResult Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask);
+
+  // The frame of the last Track(); its pose holds when the state is kTracking.
+  const Frame& frame() const { return frame_; }
+
+ private:
+  void Initialise(TrackingResult* result);
+  bool TrackFrame();
+  bool Relocalise();
+  bool TrackLocalMap(double radius_px, int min_inliers);
+  void RefreshLastFrame();
+  void CountVisibility();
+  void InsertKeyframeIfDue(TrackingResult* result);
+  void GiveUpSmallMap(TrackingResult* result);
+
+  Camera camera_;
+  OrbOptions orb_options_;
+  TrackerOptions options_;
+  Map* map_;
+  std::array<double, 4> bounds_;
+  OrbExtractor extractor_;
+  Initializer initializer_;
+  PoseTracker pose_tracker_;
+  LocalViewBuilder view_builder_;
+  Random random_;
+
+  TrackingState state_ = TrackingState::kInitialising;
+  Frame frame_, last_;
+  bool last_has_pose_ = false;
+  std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
+  KeyframeId last_keyframe_;
+  FrameId last_keyframe_frame_;
+  int lost_frames_ = 0;
+  int inliers_ = 0;
+  std::string reason_;
+  LocalView view_;
+  std::vector<uint8_t> in_view_;
+};
+
+}  // namespace dynamic_slam

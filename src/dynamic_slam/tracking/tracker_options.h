@@ -1,0 +1,90 @@
+#pragma once
+
+#include "dynamic_slam/base/option_field.h"
+#include "dynamic_slam/geometry/pnp.h"
+#include "dynamic_slam/geometry/two_view.h"
+#include "dynamic_slam/optimize/pose_optimizer.h"
+
+namespace dynamic_slam {
+
+struct InitializerOptions {
+  double feature_factor = 2.0;
+  int min_matches = 100;
+  double search_radius_px = 100;
+  int max_octave = 3;
+  TwoViewOptions two_view;
+
+  template <class Self, class Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("feature_factor", self.feature_factor,
+          OptionField{"", 1, 10, "Times the usual number of keypoints until the map is initialised."});
+    visit("min_matches", self.min_matches,
+          OptionField{"", 20, 5000, "With fewer matches to the reference frame, the current frame takes its place."});
+    visit("search_radius_px", self.search_radius_px,
+          OptionField{"px", 5, 1000, "How far from its last place a keypoint is looked for."});
+    visit("max_octave", self.max_octave,
+          OptionField{"", 0, 11, "Coarser keypoints are too inaccurate to initialise with."});
+    visit("two_view", self.two_view);
+  }
+};
+
+struct KeyframePolicyOptions {
+  double max_tracked_ratio = 0.9;
+  int min_frames = 1;
+  int max_frames = 30;
+  int min_inliers = 15;
+
+  template <class Self, class Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("max_tracked_ratio", self.max_tracked_ratio,
+          OptionField{"", 0.1, 1,
+                      "A frame that tracks less than this part of its reference keyframe's landmarks shows new things."});
+    visit("min_frames", self.min_frames, OptionField{"", 1, 1000, "Frames between two keyframes at least."});
+    visit("max_frames", self.max_frames, OptionField{"", 1, 10000, "After so many frames a keyframe is due."});
+    visit("min_inliers", self.min_inliers,
+          OptionField{"", 4, 1000, "A frame with fewer inliers is too uncertain to become a keyframe."});
+  }
+};
+
+struct TrackerOptions {
+  double motion_radius_px = 15;
+  double local_map_radius_px = 4;
+  int min_motion_inliers = 15;
+  int min_inliers = 20;
+  int min_relocalisation_inliers = 30;
+  int local_keyframes = 60;
+  int relocalisation_keyframes = 20;
+  int reset_keyframes = 5;
+  int reset_after_frames = 15;
+  InitializerOptions initializer;
+  KeyframePolicyOptions keyframe;
+  PoseOptimizerOptions pose;
+  PnpOptions pnp;
+
+  template <class Self, class Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("motion_radius_px", self.motion_radius_px,
+          OptionField{"px", 1, 200, "Search radius about the place that the motion model predicts, in octave 0."});
+    visit("local_map_radius_px", self.local_map_radius_px,
+          OptionField{"px", 0.5, 100, "Search radius about a local landmark's projection, in octave 0."});
+    visit("min_motion_inliers", self.min_motion_inliers,
+          OptionField{"", 4, 1000, "Inliers that a first guess of the pose needs."});
+    visit("min_inliers", self.min_inliers, OptionField{"", 4, 1000, "Inliers with less than which the camera is lost."});
+    visit("min_relocalisation_inliers", self.min_relocalisation_inliers,
+          OptionField{"", 4, 1000, "Inliers that it takes to be found again."});
+    visit("local_keyframes", self.local_keyframes,
+          OptionField{"", 2, 1000, "Keyframes whose landmarks make the local map."});
+    visit("relocalisation_keyframes", self.relocalisation_keyframes,
+          OptionField{"", 1, 1000, "Keyframes tried on each frame while lost."});
+    visit("reset_keyframes", self.reset_keyframes,
+          OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
+    visit("reset_after_frames", self.reset_after_frames,
+          OptionField{"", 1, 10000, "Lost frames after which such a small map is given up."});
+    visit("initializer", self.initializer);
+    visit("keyframe", self.keyframe);
+    visit("pose", self.pose);
+    visit("pnp", self.pnp);
+  }
+};
+
+}  // namespace dynamic_slam
