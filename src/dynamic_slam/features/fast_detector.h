@@ -9,7 +9,8 @@
 namespace dynamic_slam {
 
 struct Corner {
-  uint16_t x, y;  // px of the pyramid level
+  uint16_t x, y;  // px
+  float dx, dy;   // from there to the peak of the score between the pixels; in [-0.5, 0.5] px
   uint8_t score;  // grey levels, see FastDetector
 };
 

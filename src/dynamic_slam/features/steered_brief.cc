@@ -3,15 +3,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "dynamic_slam/base/error.h"
-#include "dynamic_slam/base/random.h"
 #include "dynamic_slam/features/multiversion.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr int kPatchRadius = 15;  // px, of the orientation
-constexpr int kTestRadius = 13;   // px, of the tests: 3 px of blur fit between them and kBorder
 constexpr int kRowPixels = 32;    // a row of the patch, and one more
 
 // For each row of the patch 1 within the circle, else 0; and the same times the horizontal offset.
@@ -53,35 +50,17 @@ void Moments(const uint8_t* __restrict patch, ptrdiff_t stride, int* moment_x, i
   *moment_y = sum_y;
 }
 
-// Gaussian, sigma 2, in 256ths.
-constexpr std::array<uint16_t, 4> kGauss = {56, 49, 33, 18};
-
-// out[x] = the seven rows or columns around it, weighted. Pointers may be of one array, a column apart.
-DS_MULTIVERSION
-void WeightSeven(const uint8_t* a3, const uint8_t* a2, const uint8_t* a1, const uint8_t* m, const uint8_t* b1,
-                 const uint8_t* b2, const uint8_t* b3, int count, uint8_t* __restrict out) {
-  for (int x = 0; x < count; ++x) {
-    const uint16_t sum = static_cast<uint16_t>(
-        static_cast<uint16_t>(m[x] * kGauss[0]) + static_cast<uint16_t>((a1[x] + b1[x]) * kGauss[1]) +
-        static_cast<uint16_t>((a2[x] + b2[x]) * kGauss[2]) +
-        static_cast<uint16_t>((a3[x] + b3[x]) * kGauss[3]) + uint16_t{128});
-    out[x] = static_cast<uint8_t>(sum >> 8);
-  }
-}
+// {x, y} of the first point and of the second of each test, px, at most 15 px from the keypoint: with kBorder
+// the smoothing of 3 px fits between them and the edge.
+constexpr std::array<std::array<int8_t, 4>, 256> kTestPoints = {{
+#include "dynamic_slam/features/orb_tests.inc"
+}};
 
 }  // namespace
 
 SteeredBrief::SteeredBrief(ptrdiff_t stride) : offsets_(kAngles) {
-  // Isotropic Gaussian pairs (Calonder et al., BRIEF, 2010, variant II).
-  Random random(1);
   for (int test = 0; test < kTests; ++test) {
-    std::array<double, 4> point;
-    for (int i = 0; i < 4; i += 2) {
-      do {
-        point[i] = 31.0 / 5 * random.Gaussian();
-        point[i + 1] = 31.0 / 5 * random.Gaussian();
-      } while (std::hypot(point[i], point[i + 1]) > kTestRadius);
-    }
+    const std::array<int8_t, 4>& point = kTestPoints[test];
     for (int k = 0; k < kAngles; ++k) {
       const double angle = 2 * std::numbers::pi * k / kAngles;
       const double c = std::cos(angle), s = std::sin(angle);
@@ -113,22 +92,6 @@ Descriptor SteeredBrief::Describe(const uint8_t* centre, float angle_rad) const 
     descriptor[word] = bits;
   }
   return descriptor;
-}
-
-void SteeredBrief::Blur(const cv::Mat& image, cv::Mat* blurred, std::vector<uint8_t>* buffer) {
-  DS_CHECK(image.size() == blurred->size() && image.type() == CV_8UC1 && blurred->type() == CV_8UC1,
-           "{}x{} {}x{}", image.cols, image.rows, blurred->cols, blurred->rows);
-  const int width = image.cols;
-  if (width < 7 || image.rows < 7) return;
-  if (buffer->size() < static_cast<size_t>(width)) buffer->resize(width);
-  uint8_t* row = buffer->data();
-  for (int y = 3; y < image.rows - 3; ++y) {
-    WeightSeven(image.ptr<uint8_t>(y - 3), image.ptr<uint8_t>(y - 2), image.ptr<uint8_t>(y - 1),
-                image.ptr<uint8_t>(y), image.ptr<uint8_t>(y + 1), image.ptr<uint8_t>(y + 2),
-                image.ptr<uint8_t>(y + 3), width, row);
-    WeightSeven(row, row + 1, row + 2, row + 3, row + 4, row + 5, row + 6, width - 6,
-                blurred->ptr<uint8_t>(y) + 3);
-  }
 }
 
 }  // namespace dynamic_slam
