@@ -27,15 +27,17 @@ struct PoseObservations {
 };
 
 struct PoseOptimizerOptions {
-  int robust_rounds = 2;
+  int robust_rounds = 3;
   int plain_rounds = 2;
   int iterations_per_round = 10;
   double chi2 = 5.991;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
-    visit("robust_rounds", self.robust_rounds,
-          OptionField{"", 1, 10, "Rounds with a Huber kernel; outliers are named again after each."});
+    visit(
+        "robust_rounds", self.robust_rounds,
+        OptionField{"", 1, 10,
+                    "Rounds with a Huber kernel; outliers are named again after each, ever more strictly."});
     visit("plain_rounds", self.plain_rounds, OptionField{"", 0, 10, "Rounds after that, without a kernel."});
     visit("iterations_per_round", self.iterations_per_round,
           OptionField{"", 1, 100, "Most steps in a round; small steps end it sooner."});
@@ -75,7 +77,7 @@ class PoseOptimizer {
   bool Descend(bool robust, Rigid3* cam_from_world) const;
 
   // Names the inliers among all observations at this pose and counts them; true if a flag changed.
-  bool Classify(const PoseObservations& all, PoseEstimate* estimate) const;
+  bool Classify(const PoseObservations& all, double chi2, PoseEstimate* estimate) const;
 
   double fx_, fy_, cx_, cy_;  // px
   PoseOptimizerOptions options_;
