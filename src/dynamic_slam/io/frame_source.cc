@@ -1,0 +1,253 @@
+#include "dynamic_slam/io/frame_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/text.h"
+#include "dynamic_slam/io/camera_file.h"
+#include "dynamic_slam/io/source_layout.h"
+
+namespace dynamic_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kDefaultFps = 30;
+
+// Libjpeg fills up a truncated image with grey and calls it a success: the last start of scan (FF DA) must
+// have an end of image (FF D9) after it. Neither pair occurs in entropy-coded data.
+bool IsTruncatedJpeg(const std::string& bytes) {
+  if (!bytes.starts_with("\xFF\xD8\xFF")) return false;
+  const size_t scan = bytes.rfind("\xFF\xDA"), end = bytes.rfind("\xFF\xD9");
+  return scan == std::string::npos || end == std::string::npos || end < scan;
+}
+
+// The image as CV_8UC1, or an empty one and the reason.
+cv::Mat DecodeGrey(const fs::path& file, std::string* reason) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) return *reason = "the file is missing", cv::Mat();
+  std::string bytes;
+  try {
+    bytes = ReadFile(file);
+  } catch (const InputError&) {
+    return *reason = "the file cannot be read", cv::Mat();
+  }
+  if (bytes.empty()) return *reason = "the file is empty", cv::Mat();
+  if (IsTruncatedJpeg(bytes)) return *reason = "the image is truncated", cv::Mat();
+  cv::Mat grey;
+  try {
+    grey =
+        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data()), cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    grey.release();
+  }
+  if (grey.empty()) *reason = "the image cannot be decoded";
+  return grey;
+}
+
+// What all sources do alike: keep the first image, check size and stamp of each.
+class CheckedSource : public FrameSource {
+ public:
+  explicit CheckedSource(std::string layout) : layout_(std::move(layout)) {}
+
+  std::optional<SourceImage> Next() final {
+    if (first_) return std::exchange(first_, std::nullopt);
+    SourceImage image;
+    std::string reason;
+    while (ReadNext(&image, &reason)) {
+      if (reason.empty()) reason = Refusal(image);
+      if (reason.empty()) {
+        last_stamp_s_ = image.timestamp_s;
+        return image;
+      }
+      problems_.push_back({image.name, std::exchange(reason, "")});
+    }
+    return std::nullopt;
+  }
+
+  std::string Layout() const final { return layout_; }
+  cv::Size ImageSize() const final { return size_; }
+  const std::vector<SourceProblem>& Problems() const final { return problems_; }
+
+ protected:
+  // The next frame in order. false: there is none. *reason, empty at the call, is set when it cannot be read.
+  virtual bool ReadNext(SourceImage* image, std::string* reason) = 0;
+
+  // Reads the first image, which fixes the size. Throws InputError when there is none.
+  void ReadFirst(const fs::path& path) {
+    first_ = Next();
+    if (first_) return;
+    std::string reason = "no image of it can be read";
+    if (!problems_.empty()) reason += fmt::format(" (first: {}: {})", problems_[0].name, problems_[0].reason);
+    throw InputError(path.string(), reason, "Check the files, and --start and --max-frames where given.");
+  }
+
+ private:
+  std::string Refusal(const SourceImage& image) {
+    if (last_stamp_s_ && image.timestamp_s < *last_stamp_s_) {
+      return fmt::format("its stamp {:.6f} goes back behind {:.6f}", image.timestamp_s, *last_stamp_s_);
+    }
+    if (last_stamp_s_ && image.timestamp_s == *last_stamp_s_) {
+      return fmt::format("its stamp {:.6f} is a duplicate", image.timestamp_s);
+    }
+    if (size_.empty()) size_ = image.grey.size();
+    if (image.grey.size() != size_) {
+      return fmt::format("its size is {} x {} px, that of the first image {} x {} px", image.grey.cols,
+                         image.grey.rows, size_.width, size_.height);
+    }
+    return "";
+  }
+
+  std::string layout_;
+  cv::Size size_;
+  std::optional<SourceImage> first_;
+  std::optional<double> last_stamp_s_;
+  std::vector<SourceProblem> problems_;
+};
+
+// A folder with a list of image files.
+class ListedSource : public CheckedSource {
+ public:
+  ListedSource(const fs::path& path, SourceListing listing, const FrameSourceOptions& options)
+      : CheckedSource(listing.layout), listing_(std::move(listing)), all_(listing_.entries) {
+    const size_t start = static_cast<size_t>(options.start);
+    if (start >= all_.size()) {
+      throw InputError(path.string(),
+                       fmt::format("--start {} skips all of its {} frames", start, all_.size()),
+                       "Start earlier.");
+    }
+    next_ = start;
+    const size_t wanted = static_cast<size_t>(options.max_frames);
+    end_ = wanted == 0 ? all_.size() : std::min(all_.size(), start + wanted);
+    count_ = end_ - next_;
+    ReadFirst(path);
+  }
+
+  size_t FrameCount() const override { return count_; }
+
+  std::optional<Camera> OwnCamera() const override {
+    if (fs::is_regular_file(listing_.folder / "camera.yaml"))
+      return ReadCamera(listing_.folder / "camera.yaml");
+    if (!fs::is_regular_file(listing_.calib)) return std::nullopt;
+    if (Layout() == "euroc") return ReadEurocSensor(listing_.calib);
+    return ReadKittiCalibration(listing_.calib, ImageSize(), MeanFps());
+  }
+
+ protected:
+  bool ReadNext(SourceImage* image, std::string* reason) override {
+    if (next_ == end_) return false;
+    const SourceEntry& entry = all_[next_++];
+    *reason = entry.problem;
+    *image = {entry.timestamp_s, {}, entry.name};
+    if (reason->empty()) image->grey = DecodeGrey(entry.file, reason);
+    return true;
+  }
+
+ private:
+  double MeanFps() const {
+    const SourceEntry *first = nullptr, *last = nullptr;
+    size_t count = 0;
+    for (const SourceEntry& entry : all_) {
+      if (!entry.problem.empty()) continue;
+      if (first == nullptr) first = &entry;
+      last = &entry;
+      ++count;
+    }
+    if (count < 2 || !(last->timestamp_s > first->timestamp_s)) return 0;
+    return static_cast<double>(count - 1) / (last->timestamp_s - first->timestamp_s);
+  }
+
+  SourceListing listing_;
+  const std::vector<SourceEntry>& all_;
+  size_t next_ = 0, end_ = 0, count_ = 0;
+};
+
+class VideoSource : public CheckedSource {
+ public:
+  VideoSource(const fs::path& path, const FrameSourceOptions& options) : CheckedSource("video") {
+    if (!OpenQuietly(path.string())) {
+      throw InputError(path.string(), "is not a video that can be read",
+                       "Convert it, for instance with ffmpeg to MP4, or into a folder of images.");
+    }
+    fps_ = options.fps > 0 ? options.fps : capture_.get(cv::CAP_PROP_FPS);
+    if (!(fps_ > 0 && fps_ < 1e5)) fps_ = kDefaultFps;
+    const double announced = capture_.get(cv::CAP_PROP_FRAME_COUNT);
+    total_ = announced > 0 && announced < 1e9 ? static_cast<size_t>(announced) : 0;
+    start_ = static_cast<size_t>(options.start);
+    // Seeking by number is inexact in many formats; grabbing is exact and converts nothing.
+    while (index_ < start_ && capture_.grab()) ++index_;
+    if (options.max_frames > 0) end_ = start_ + static_cast<size_t>(options.max_frames);
+    ReadFirst(path);
+  }
+
+  size_t FrameCount() const override {
+    if (total_ == 0) return 0;
+    const size_t end = end_ == 0 ? total_ : std::min(end_, total_);
+    return end > start_ ? end - start_ : 0;
+  }
+
+  std::optional<Camera> OwnCamera() const override { return std::nullopt; }
+
+ protected:
+  bool ReadNext(SourceImage* image, std::string* reason) override {
+    if (ended_ || (end_ != 0 && index_ >= end_)) return false;
+    image->timestamp_s = static_cast<double>(index_) / fps_;
+    image->name = fmt::format("frame {}", index_);
+    cv::Mat frame;
+    if (!capture_.read(frame) || frame.empty()) {
+      ended_ = true;
+      if (total_ == 0 || index_ >= total_) return false;
+      *reason = fmt::format("the video ends here, though {} frames are announced", total_);
+      return true;
+    }
+    ++index_;
+    if (frame.channels() == 1) {
+      image->grey = frame.clone();  // the decoder may use its buffer again
+    } else {
+      image->grey.release();
+      cv::cvtColor(frame, image->grey, frame.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
+    }
+    return true;
+  }
+
+ private:
+  // Each of OpenCV's backends logs why it cannot read a file; our error says it once.
+  bool OpenQuietly(const std::string& file) {
+    const auto level = cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    const bool opened = capture_.open(file);
+    cv::utils::logging::setLogLevel(level);
+    return opened;
+  }
+
+  cv::VideoCapture capture_;
+  double fps_ = kDefaultFps;
+  size_t total_ = 0, start_ = 0, end_ = 0, index_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSource> OpenFrameSource(const fs::path& path, const FrameSourceOptions& options) {
+  if (options.start < 0 || options.max_frames < 0 || !(options.fps >= 0 && options.fps < 1e5)) {
+    throw InputError("options of the source",
+                     fmt::format("fps {}, start {}, max_frames {}: none may be negative", options.fps,
+                                 options.start, options.max_frames),
+                     "Leave out what is not needed.");
+  }
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) {
+    throw InputError(path.string(), "there is no such file or folder", "Check the path.");
+  }
+  if (!fs::is_directory(path, ignored)) return std::make_unique<VideoSource>(path, options);
+  const double fps = options.fps > 0 ? options.fps : kDefaultFps;
+  return std::make_unique<ListedSource>(path, ListSource(path, fps), options);
+}
+
+}  // namespace dynamic_slam
