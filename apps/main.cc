@@ -5,6 +5,8 @@
 #include <fmt/core.h>
 
 #include "cmd_eval.h"
+#include "cmd_run.h"
+#include "cmd_simulate.h"
 #include "dynamic_slam/base/error.h"
 
 namespace {
@@ -20,10 +22,13 @@ int main(int argc, char** argv) {
                "dynamic_slam");
   app.set_version_flag("--version", "dynamic_slam " DYNAMIC_SLAM_VERSION);
   app.require_subcommand(1);
+  int exit_code = 0;
+  dynamic_slam::AddRunCommand(app, &exit_code);
   dynamic_slam::AddEvalCommand(app);
+  dynamic_slam::AddSimulateCommand(app);
   try {
     app.parse(argc, argv);  // runs the subcommand
-    return 0;
+    return exit_code;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitInput;  // --help and --version end here with 0
   } catch (const dynamic_slam::InputError& error) {

@@ -1,0 +1,109 @@
+#include "cmd_run.h"
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/options.h"
+#include "dynamic_slam/io/camera_file.h"
+#include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/system/sequence_runner.h"
+#include "dynamic_slam/system/slam_system.h"
+#include "run_console.h"
+
+namespace dynamic_slam {
+namespace {
+
+struct RunArguments {
+  std::string source;
+  std::string camera;
+  std::string config;
+  std::vector<std::string> assignments;
+  std::string detector = "none";
+  std::string mode = "offline";
+  std::string out;
+  FrameSourceOptions source_options;
+  bool quiet = false;
+};
+
+Camera ChooseCamera(const RunArguments& arguments, const FrameSource& source) {
+  Camera camera;
+  if (!arguments.camera.empty()) {
+    camera = LoadCamera(arguments.camera);
+  } else if (const std::optional<Camera> own = source.OwnCamera(); own.has_value()) {
+    camera = *own;
+  } else {
+    std::string known;
+    for (const std::string& name : KnownCameras()) known += (known.empty() ? "" : ", ") + name;
+    throw InputError(arguments.source, "has no camera file of its own",
+                     fmt::format("Give one with --camera FILE, or --camera NAME with one of: {}.", known));
+  }
+  CheckCameraFits(camera, source.ImageSize());
+  return camera;
+}
+
+std::filesystem::path OutputFolder(const RunArguments& arguments) {
+  if (!arguments.out.empty()) return arguments.out;
+  std::filesystem::path source = std::filesystem::path(arguments.source).lexically_normal();
+  if (source.filename().empty()) source = source.parent_path();
+  return std::filesystem::path("out") / source.stem();
+}
+
+void RunSource(const RunArguments& arguments, int* exit_code) {
+  SystemOptions options;
+  if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
+  ApplySet(&options, arguments.assignments);
+  const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
+  const Camera camera = ChooseCamera(arguments, *source);
+  const std::filesystem::path out = OutputFolder(arguments);
+  PrepareOutputFolder(out);
+
+  SlamSystem system(camera, options);
+  RunConsole console(arguments.quiet);
+  RunSummary summary = RunSequence(*source, system, [&console](const RunProgress& p) { return console.Show(p); });
+  summary.source = arguments.source;
+  console.End();
+  WriteResults(out, system, summary);
+  PrintSummary(summary, system, arguments.source, out);
+  if (summary.interrupted) *exit_code = kExitInterrupted;
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, int* exit_code) {
+  CLI::App* command = app.add_subcommand("run", "Find the camera's path through a sequence, and a map");
+  const auto arguments = std::make_shared<RunArguments>();
+  RunArguments& a = *arguments;
+  command
+      ->add_option("SOURCE", a.source,
+                   "Folder in TUM RGB-D, KITTI odometry or EuRoC layout, folder of images, or video file")
+      ->required();
+  command->add_option("--camera", a.camera, "Name of a known camera, or camera file (default: what SOURCE says)");
+  command->add_option("--config", a.config, "YAML file with options (the keys of config.yaml in the results)");
+  command->add_option("--set", a.assignments, "One option, key=value; may be repeated")->type_name("KEY=VALUE");
+  command->add_option("--detector", a.detector, "Object detector")->check(CLI::IsMember({"none"}))->capture_default_str();
+  command->add_option("--mode", a.mode, "offline: every frame, reproducible")
+      ->check(CLI::IsMember({"offline"}))
+      ->capture_default_str();
+  command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
+  command->add_option("--start", a.source_options.start, "Frames to skip first")->check(CLI::NonNegativeNumber);
+  command->add_option("--max-frames", a.source_options.max_frames, "Frames to run at most (0: all)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--fps", a.source_options.fps, "Frames a second of a folder of images (30) or a video")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--quiet", a.quiet, "No progress line");
+  command->footer(
+      "Examples:\n"
+      "  dynamic_slam run rgbd_dataset_freiburg1_desk --camera tum_fr1\n"
+      "  dynamic_slam run kitti/sequences/00 --out out/kitti_00 --set orb.features=2000\n"
+      "  dynamic_slam run video.mp4 --camera my_camera.yaml");
+  command->callback([arguments, exit_code] { RunSource(*arguments, exit_code); });
+}
+
+}  // namespace dynamic_slam

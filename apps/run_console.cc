@@ -1,0 +1,98 @@
+#include "run_console.h"
+
+#include <unistd.h>
+
+#include <csignal>
+#include <optional>
+
+#include <fmt/core.h>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/eval/metrics.h"
+#include "dynamic_slam/io/trajectory_file.h"
+
+namespace dynamic_slam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void OnInterrupt(int /*signal*/) { interrupted = 1; }
+
+double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+}  // namespace
+
+RunConsole::RunConsole(bool quiet)
+    : quiet_(quiet), overwrite_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_line_(start_) {
+  interrupted = 0;
+  std::signal(SIGINT, OnInterrupt);
+  std::signal(SIGTERM, OnInterrupt);
+}
+
+RunConsole::~RunConsole() {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
+
+bool RunConsole::Show(const RunProgress& progress) {
+  if (interrupted != 0) return false;
+  if (quiet_) return true;
+  const TrackingResult& tracking = progress.result->tracking;
+  const bool changed = tracking.state != last_state_;
+  last_state_ = tracking.state;
+  if (changed) {
+    End();
+    fmt::print(stderr, "frame {}: {}{}{}\n", progress.frame, Name(tracking.state), tracking.reason.empty() ? "" : ": ",
+               tracking.reason);
+  }
+  // A file gets a line every five seconds, a terminal five a second.
+  if (SecondsSince(last_line_) < (overwrite_ ? 0.2 : 5.0)) return true;
+  last_line_ = Clock::now();
+  const std::string total = progress.frames_total > 0 ? fmt::format("/{}", progress.frames_total) : "";
+  fmt::print(stderr, "{}frame {}{}  {:.0f} frames/s  {}  {} inliers  {} keyframes  {} landmarks  {}{}",
+             overwrite_ ? "\r\033[K" : "", progress.frame, total,
+             static_cast<double>(progress.frame) / SecondsSince(start_), Name(tracking.state), tracking.inliers,
+             progress.map->keyframes().size(), progress.map->landmarks().size(),
+             tracking.state == TrackingState::kTracking ? "" : tracking.reason, overwrite_ ? "" : "\n");
+  line_open_ = overwrite_;
+  std::fflush(stderr);
+  return true;
+}
+
+void RunConsole::End() {
+  if (line_open_) fmt::print(stderr, "\r\033[K");
+  line_open_ = false;
+}
+
+void PrintSummary(const RunSummary& summary, const SlamSystem& system, const std::string& source,
+                  const std::filesystem::path& out) {
+  fmt::print("{} of {} frames have a pose ({:.1f}%), {} keyframes, {} landmarks\n", summary.frames_tracked,
+             summary.frames_total, 100.0 * summary.Coverage(), summary.keyframes, summary.landmarks);
+  if (summary.interrupted) fmt::print("interrupted: these are the results up to then\n");
+  if (summary.initialised_at.has_value()) {
+    fmt::print("initialised at frame {}, lost {} times\n", *summary.initialised_at, summary.lost_count);
+  } else {
+    fmt::print("no map was made: {}\n", summary.last_reason);
+  }
+  for (const SourceProblem& problem : summary.skipped) fmt::print("skipped {}: {}\n", problem.name, problem.reason);
+  fmt::print("tracking {:.1f} ms a frame (median), mapping {:.1f} ms a keyframe, {:.1f} s in all\n",
+             summary.tracking_ms.median, summary.mapping_ms.median, summary.wall_s);
+  // Ground truth is a bonus here: without it, or without an overlap, the run is as good.
+  try {
+    const std::optional<Trajectory> truth = LoadGroundTruth(source);
+    const Trajectory trajectory = system.FrameTrajectory();
+    if (truth.has_value() && trajectory.size() >= 3) {
+      const MatchedPoses matched = MatchByTime(ToPoseList(*truth), ToPoseList(trajectory), 0.01);
+      const TrajectoryErrors errors = AbsolutePoseError(matched, Alignment::kSim3);
+      fmt::print("APE against the ground truth, after sim(3) alignment: rmse {:.4f} m, median {:.4f} m, {} poses\n",
+                 errors.translation_m.rmse, errors.translation_m.median, errors.translation_m.n);
+    }
+  } catch (const InputError& error) {
+    fmt::print("no APE: {}\n", error.what());
+  }
+  fmt::print("results: {}\n", out.string());
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+
+#include "dynamic_slam/system/sequence_runner.h"
+
+namespace dynamic_slam {
+
+inline constexpr int kExitInterrupted = 130;
+
+// Shows a run on the terminal: one line that is written over, a line for each change of state, and takes Ctrl-C as
+// the wish to end the run with everything so far.
+class RunConsole {
+ public:
+  explicit RunConsole(bool quiet);
+  ~RunConsole();
+  RunConsole(const RunConsole&) = delete;
+  RunConsole& operator=(const RunConsole&) = delete;
+
+  // False after an interrupt.
+  bool Show(const RunProgress& progress);
+
+  // Ends the line.
+  void End();
+
+ private:
+  bool quiet_;
+  bool overwrite_;  // standard error is a terminal
+  bool line_open_ = false;
+  std::chrono::steady_clock::time_point start_, last_line_;
+  TrackingState last_state_ = TrackingState::kInitialising;
+};
+
+// What came out, where the files are, and how far it is from the ground truth that lies beside the source, if any.
+void PrintSummary(const RunSummary& summary, const SlamSystem& system, const std::string& source,
+                  const std::filesystem::path& out);
+
+}  // namespace dynamic_slam
