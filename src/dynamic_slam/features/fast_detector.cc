@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 
 #include "dynamic_slam/base/error.h"
@@ -17,29 +18,14 @@ inline uint8_t Max(uint8_t a, uint8_t b) { return a > b ? a : b; }
 DS_MULTIVERSION
 void ScoreRow(const uint8_t* __restrict centre, ptrdiff_t stride, int begin, int end,
               uint8_t* __restrict score) {
-  // The circle, clockwise from the top.
-  const uint8_t* c0 = centre - 3 * stride;
-  const uint8_t* c1 = centre - 3 * stride + 1;
-  const uint8_t* c2 = centre - 2 * stride + 2;
-  const uint8_t* c3 = centre - stride + 3;
-  const uint8_t* c4 = centre + 3;
-  const uint8_t* c5 = centre + stride + 3;
-  const uint8_t* c6 = centre + 2 * stride + 2;
-  const uint8_t* c7 = centre + 3 * stride + 1;
-  const uint8_t* c8 = centre + 3 * stride;
-  const uint8_t* c9 = centre + 3 * stride - 1;
-  const uint8_t* c10 = centre + 2 * stride - 2;
-  const uint8_t* c11 = centre + stride - 3;
-  const uint8_t* c12 = centre - 3;
-  const uint8_t* c13 = centre - stride - 3;
-  const uint8_t* c14 = centre - 2 * stride - 2;
-  const uint8_t* c15 = centre - 3 * stride - 1;
+  const uint8_t *u3 = centre - 3 * stride, *u2 = centre - 2 * stride, *u1 = centre - stride;  // rows above
+  const uint8_t *d1 = centre + stride, *d2 = centre + 2 * stride, *d3 = centre + 3 * stride;  // and below
   for (int x = begin; x < end; ++x) {
-    const uint8_t p0 = c0[x], p1 = c1[x], p2 = c2[x], p3 = c3[x], p4 = c4[x], p5 = c5[x], p6 = c6[x],
-                  p7 = c7[x];
-    const uint8_t p8 = c8[x], p9 = c9[x], p10 = c10[x], p11 = c11[x], p12 = c12[x], p13 = c13[x],
-                  p14 = c14[x];
-    const uint8_t p15 = c15[x];
+    // The circle, clockwise from the top.
+    const uint8_t p0 = u3[x], p1 = u3[x + 1], p2 = u2[x + 2], p3 = u1[x + 3];
+    const uint8_t p4 = centre[x + 3], p5 = d1[x + 3], p6 = d2[x + 2], p7 = d3[x + 1];
+    const uint8_t p8 = d3[x], p9 = d3[x - 1], p10 = d2[x - 2], p11 = d1[x - 3];
+    const uint8_t p12 = centre[x - 3], p13 = u1[x - 3], p14 = u2[x - 2], p15 = u3[x - 1];
     // The brightest minimum over 9 in a row. Two arcs of 9 share 8 pixels: min(shared 8, max(one end, other
     // end)). Eight pixels are four pairs (1,2) (3,4) ... (15,0).
     const uint8_t a1 = Min(p1, p2), a3 = Min(p3, p4), a5 = Min(p5, p6), a7 = Min(p7, p8);
@@ -126,10 +112,11 @@ void FastDetector::Detect(const cv::Mat& image, int border, int threshold, std::
     for (int block = begin; block < end; block += 8) {
       uint64_t eight;
       std::memcpy(&eight, marks + block, 8);
-      if (eight == 0) continue;
-      for (int x = block; x < block + 8; ++x) {
-        if (marks[x] == 0) continue;
-        corners->push_back(MakeCorner(scores, x, y));
+      if constexpr (std::endian::native == std::endian::big) eight = __builtin_bswap64(eight);
+      while (eight != 0) {  // byte by byte, the lowest first
+        const int byte = std::countr_zero(eight) / 8;
+        corners->push_back(MakeCorner(scores, block + byte, y));
+        eight &= ~(uint64_t{255} << (8 * byte));
       }
     }
     std::swap(scores[0], scores[1]);

@@ -15,7 +15,7 @@
 namespace dynamic_slam {
 namespace {
 
-// Bytes between the rows of the smoothed levels: whole cache lines, an odd number of them, since rows a power
+// Bytes between the rows of the blurred levels: whole cache lines, an odd number of them, since rows a power
 // of two apart would compete for the same places in the cache.
 int Stride(int width) { return 64 * ((width + 63) / 64 | 1); }
 
@@ -29,7 +29,7 @@ class OrbExtractor::Impl {
         height_(camera.height),
         brief_(Stride(camera.width)),
         undistortion_(camera),
-        smoothed_(cv::Mat::zeros(camera.height, Stride(camera.width), CV_8UC1)),
+        blurred_(cv::Mat::zeros(camera.height, Stride(camera.width), CV_8UC1)),
         levels_(options.levels) {
     DS_CHECK(options.levels >= 1 && options.scale_factor > 1, "levels={} scale_factor={}", options.levels,
              options.scale_factor);
@@ -37,7 +37,8 @@ class OrbExtractor::Impl {
     for (Level& level : levels_) {
       const int width = std::max(1, cvRound(width_ / scale)), height = std::max(1, cvRound(height_ / scale));
       level.image.create(height, width, CV_8UC1);
-      level.smoothed = smoothed_(cv::Rect(0, 0, width, height));
+      level.smoothed.create(height, width, CV_8UC1);
+      level.blurred = blurred_(cv::Rect(0, 0, width, height));
       level.scale_x = static_cast<float>(width_) / static_cast<float>(width);
       level.scale_y = static_cast<float>(height_) / static_cast<float>(height);
       scales_.push_back(static_cast<float>(scale));
@@ -59,7 +60,7 @@ class OrbExtractor::Impl {
       if (i > 0) cv::resize(levels_[i - 1].image, level.image, level.image.size(), 0, 0, cv::INTER_LINEAR);
       level.corners.clear();
       // Not in the paper: on a slightly smoothed image FAST finds more of the same corners again, by a tenth.
-      Smooth(level.image, kBinomial5, &level.smoothed, &row_);
+      Smooth(level.image, &level.smoothed, &row_);
       fast_.Detect(level.smoothed, SteeredBrief::kBorder, options_.fast_threshold_min, &level.corners);
       if (!mask.empty()) DropMasked(mask, &level);
       available_[i] = static_cast<int>(level.corners.size());
@@ -83,8 +84,9 @@ class OrbExtractor::Impl {
 
  private:
   struct Level {
-    cv::Mat image;           // CV_8UC1
-    cv::Mat smoothed;        // of the same size; all levels share the memory and use it one after the other
+    cv::Mat image;     // CV_8UC1
+    cv::Mat smoothed;  // for the corners
+    cv::Mat blurred;   // for the descriptors; all levels share the memory and use it one after the other
     float scale_x, scale_y;  // full-resolution px per px; the two differ as sizes are whole numbers
     std::vector<Corner> corners;
 
@@ -100,7 +102,7 @@ class OrbExtractor::Impl {
   }
 
   void Describe(Level& level, int octave, FeatureSet* features) {
-    Smooth(level.image, kGauss7, &level.smoothed, &row_);
+    SmoothMore(level.smoothed, &level.blurred, &row_);
     for (const Corner& corner : level.corners) {
       Keypoint keypoint;
       keypoint.raw_x = keypoint.x = level.FullX(corner.x + corner.dx);
@@ -111,7 +113,7 @@ class OrbExtractor::Impl {
       keypoint.octave = octave;
       features->keypoints.push_back(keypoint);
       features->descriptors.push_back(
-          brief_.Describe(level.smoothed.ptr<uint8_t>(corner.y) + corner.x, keypoint.angle_rad));
+          brief_.Describe(level.blurred.ptr<uint8_t>(corner.y) + corner.x, keypoint.angle_rad));
     }
   }
 
@@ -121,7 +123,7 @@ class OrbExtractor::Impl {
   CornerSelector selector_;
   SteeredBrief brief_;
   UndistortionTable undistortion_;
-  cv::Mat smoothed_;  // CV_8UC1, the memory of Level::smoothed
+  cv::Mat blurred_;  // CV_8UC1, the memory of Level::blurred
   std::vector<Level> levels_;
   std::vector<float> scales_;
   std::vector<double> weights_;  // share of the features: 1 / scale

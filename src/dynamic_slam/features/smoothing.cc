@@ -6,36 +6,48 @@
 namespace dynamic_slam {
 namespace {
 
-// out[x] = weighted sum of taps[0][x] ... taps[6][x], x in [0, count). All sums fit 16 bits.
+inline uint8_t Average(uint8_t a, uint8_t b) { return static_cast<uint8_t>((a + b + 1) >> 1); }
+
+// out[x] = the kernel over a[x], b[x], c[x], d[x], e[x].
+using Filter = void (*)(const uint8_t* a, const uint8_t* b, const uint8_t* c, const uint8_t* d,
+                        const uint8_t* e, int count, uint8_t* out);
+
 DS_MULTIVERSION
-void WeightSeven(const std::array<const uint8_t*, 7>& taps, const SmoothingKernel& kernel, int count,
-                 uint8_t* __restrict out) {
-  const uint8_t *a3 = taps[0], *a2 = taps[1], *a1 = taps[2], *m = taps[3], *b1 = taps[4], *b2 = taps[5],
-                *b3 = taps[6];
-  const uint16_t k0 = kernel[0], k1 = kernel[1], k2 = kernel[2], k3 = kernel[3];
+void Fine(const uint8_t* a, const uint8_t* b, const uint8_t* c, const uint8_t* d, const uint8_t* e, int count,
+          uint8_t* __restrict out) {
   for (int x = 0; x < count; ++x) {
-    const uint16_t sum1 = static_cast<uint16_t>(a1[x] + b1[x]);
-    const uint16_t sum2 = static_cast<uint16_t>(a2[x] + b2[x]);
-    const uint16_t sum3 = static_cast<uint16_t>(a3[x] + b3[x]);
-    const uint16_t sum = static_cast<uint16_t>(m[x] * k0 + sum1 * k1 + sum2 * k2 + sum3 * k3 + 128);
-    out[x] = static_cast<uint8_t>(sum >> 8);
+    // 1 2 1 over three values of 1 2 1.
+    const uint8_t left = Average(Average(a[x], c[x]), b[x]);
+    const uint8_t middle = Average(Average(b[x], d[x]), c[x]);
+    const uint8_t right = Average(Average(c[x], e[x]), d[x]);
+    out[x] = Average(Average(left, right), middle);
+  }
+}
+
+DS_MULTIVERSION
+void Coarse(const uint8_t* a, const uint8_t*, const uint8_t* c, const uint8_t*, const uint8_t* e, int count,
+            uint8_t* __restrict out) {
+  for (int x = 0; x < count; ++x) out[x] = Average(Average(a[x], e[x]), c[x]);
+}
+
+void Convolve(const cv::Mat& in, Filter filter, cv::Mat* out, std::vector<uint8_t>* row) {
+  DS_CHECK(in.size() == out->size() && in.type() == CV_8UC1 && out->type() == CV_8UC1 && in.data != out->data,
+           "{}x{} {}x{}", in.cols, in.rows, out->cols, out->rows);
+  if (in.cols < 5 || in.rows < 5) return;
+  if (row->size() < static_cast<size_t>(in.cols)) row->resize(in.cols);
+  uint8_t* const r = row->data();
+  for (int y = 2; y < in.rows - 2; ++y) {
+    filter(in.ptr(y - 2), in.ptr(y - 1), in.ptr(y), in.ptr(y + 1), in.ptr(y + 2), in.cols, r);
+    filter(r, r + 1, r + 2, r + 3, r + 4, in.cols - 4, out->ptr(y) + 2);
   }
 }
 
 }  // namespace
 
-void Smooth(const cv::Mat& in, const SmoothingKernel& kernel, cv::Mat* out, std::vector<uint8_t>* row) {
-  DS_CHECK(in.size() == out->size() && in.type() == CV_8UC1 && out->type() == CV_8UC1, "{}x{} {}x{}", in.cols,
-           in.rows, out->cols, out->rows);
-  if (in.cols < 7 || in.rows < 7) return;
-  if (row->size() < static_cast<size_t>(in.cols)) row->resize(in.cols);
-  const uint8_t* r = row->data();
-  for (int y = 3; y < in.rows - 3; ++y) {
-    WeightSeven(
-        {in.ptr(y - 3), in.ptr(y - 2), in.ptr(y - 1), in.ptr(y), in.ptr(y + 1), in.ptr(y + 2), in.ptr(y + 3)},
-        kernel, in.cols, row->data());
-    WeightSeven({r, r + 1, r + 2, r + 3, r + 4, r + 5, r + 6}, kernel, in.cols - 6, out->ptr(y) + 3);
-  }
+void Smooth(const cv::Mat& in, cv::Mat* out, std::vector<uint8_t>* row) { Convolve(in, Fine, out, row); }
+
+void SmoothMore(const cv::Mat& in, cv::Mat* out, std::vector<uint8_t>* row) {
+  Convolve(in, Coarse, out, row);
 }
 
 }  // namespace dynamic_slam

@@ -50,8 +50,8 @@ void Moments(const uint8_t* __restrict patch, ptrdiff_t stride, int* moment_x, i
   *moment_y = sum_y;
 }
 
-// {x, y} of the first point and of the second of each test, px, at most 15 px from the keypoint: with kBorder
-// the smoothing of 3 px fits between them and the edge.
+// {x, y} of the first point and of the second of each test, px, at most 15 px from the keypoint: within
+// kBorder that leaves the 4 px at the edge that smoothing does not reach.
 constexpr std::array<std::array<int8_t, 4>, 256> kTestPoints = {{
 #include "dynamic_slam/features/orb_tests.inc"
 }};

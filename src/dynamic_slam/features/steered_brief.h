@@ -16,7 +16,7 @@ namespace dynamic_slam {
 class SteeredBrief {
  public:
   // Px between a keypoint and the edge of its image.
-  static constexpr int kBorder = 18;
+  static constexpr int kBorder = 19;
 
   // stride: bytes between the rows of every smoothed image that Describe will see.
   explicit SteeredBrief(ptrdiff_t stride);
@@ -26,7 +26,8 @@ class SteeredBrief {
   static float Angle(const cv::Mat& image, int x, int y);
 
   // Bit i is set when the first point of test i is darker than the second. centre: the keypoint's pixel, at
-  // least kBorder from the edges, in the image smoothed by kGauss7, so that no single pixel decides a test.
+  // least kBorder from the edges, in an image smoothed so far (2 px or so) that no single pixel decides a
+  // test.
   Descriptor Describe(const uint8_t* centre, float angle_rad) const;
 
  private:
