@@ -1,7 +1,9 @@
 #include "dynamic_slam/sim/renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include <Eigen/LU>
 
@@ -44,6 +46,32 @@ cv::Rect PixelBox(const Camera& camera, const Rigid3& cam_from_world, const Text
   const cv::Point first(static_cast<int>(std::floor(low.x())), static_cast<int>(std::floor(low.y())));
   const cv::Point last(static_cast<int>(std::ceil(high.x())), static_cast<int>(std::ceil(high.y())));
   return cv::Rect(first, last + cv::Point(1, 1)) & whole;
+}
+
+// One row of pixels against one quad. Without branches and aliasing, so that the compiler makes vectors of
+// it.
+void UpdateNearest(const Eigen::Matrix3f& m, int id, int count, const float* __restrict x,
+                   const float* __restrict y, float* __restrict best, int* __restrict best_id) {
+  const float m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2), m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2),
+              m20 = m(2, 0), m21 = m(2, 1), m22 = m(2, 2);
+  for (int i = 0; i < count; ++i) {
+    const float a = m00 * x[i] + m01 * y[i] + m02;
+    const float b = m10 * x[i] + m11 * y[i] + m12;
+    const float c = m20 * x[i] + m21 * y[i] + m22;
+    // Each bound as a distance that is not negative: one minimum instead of six comparisons.
+    const float inside = std::min(std::min(std::min(a, b), std::min(c - a, c - b)), kMaxInverseDepth - c);
+    const bool wins = (inside >= 0) & (c > best[i]);
+    best[i] = wins ? c : best[i];
+    best_id[i] = wins ? id : best_id[i];
+  }
+}
+
+// log2 to 0.01, for x >= 1: the exponent and a parabola through the mantissa.
+float FastLog2(float x) {
+  const uint32_t bits = std::bit_cast<uint32_t>(x);
+  const float mantissa = std::bit_cast<float>((bits & 0x007fffffu) | 0x3f800000u);
+  return static_cast<float>(static_cast<int>(bits >> 23) - 128) + mantissa * (2.0f - mantissa / 3.0f) -
+         2.0f / 3.0f;
 }
 
 }  // namespace
@@ -100,23 +128,11 @@ cv::Mat1i Renderer::NearestQuads(const std::vector<View>& views) const {
   cv::Mat1i nearest(camera_.height, camera_.width, -1);
   cv::Mat1f inverse_depth(camera_.height, camera_.width, 0.0f);
   for (size_t i = 0; i < views.size(); ++i) {
-    const Eigen::Matrix3f& m = views[i].inverse;
-    const cv::Rect& box = views[i].box;
-    const int id = static_cast<int>(i);
+    const Eigen::Matrix3f m = views[i].inverse;
+    const cv::Rect box = views[i].box;
     for (int row = box.y; row < box.y + box.height; ++row) {
-      const float *x = ray_x_[row], *y = ray_y_[row];
-      float* best = inverse_depth[row];
-      int* best_id = nearest[row];
-      for (int column = box.x; column < box.x + box.width; ++column) {
-        const float a = m(0, 0) * x[column] + m(0, 1) * y[column] + m(0, 2);
-        const float b = m(1, 0) * x[column] + m(1, 1) * y[column] + m(1, 2);
-        const float c = m(2, 0) * x[column] + m(2, 1) * y[column] + m(2, 2);
-        // One expression without branches, so that the compiler can make vectors of it.
-        const bool wins =
-            (a >= 0) & (b >= 0) & (a <= c) & (b <= c) & (c > best[column]) & (c < kMaxInverseDepth);
-        best[column] = wins ? c : best[column];
-        best_id[column] = wins ? id : best_id[column];
-      }
+      UpdateNearest(m, static_cast<int>(i), box.width, &ray_x_(row, box.x), &ray_y_(row, box.x),
+                    &inverse_depth(row, box.x), &nearest(row, box.x));
     }
   }
   return nearest;
@@ -138,7 +154,7 @@ float Renderer::Shade(const View& view, float ray_x, float ray_y) const {
   const float longer = std::max(right_length, down_length), shorter = std::min(right_length, down_length);
   const int samples = std::clamp(static_cast<int>(longer / std::max(shorter, 1e-6f) + 0.5f), 1, 6);
   const float footprint = std::max(shorter, longer / static_cast<float>(samples));
-  const float level = footprint <= 1.0f ? 0.0f : std::log2(footprint);
+  const float level = footprint <= 1.0f ? 0.0f : FastLog2(footprint);
   float sum = 0;
   for (int i = 0; i < samples; ++i) {
     const float step = (static_cast<float>(i) + 0.5f) / static_cast<float>(samples) - 0.5f;
