@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
@@ -11,6 +12,7 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/eval/metrics.h"
 #include "dynamic_slam/eval/pose_list.h"
+#include "dynamic_slam/io/trajectory_file.h"
 
 namespace dynamic_slam {
 namespace {
@@ -39,10 +41,12 @@ Match ReadAndMatch(const EvalArguments& arguments) {
     throw InputError("--times", "goes with --format kitti only", "TUM files have their own stamps.");
   }
   const bool by_row = kitti && arguments.times.empty();
-  const PoseList reference =
-      kitti ? ReadKittiPoses(arguments.ground_truth, arguments.times) : ReadTumPoses(arguments.ground_truth);
-  const PoseList estimate =
-      by_row ? ReadKittiPoses(arguments.estimate, "") : ReadTumPoses(arguments.estimate);
+  std::vector<double> times_s;
+  if (!arguments.times.empty()) times_s = ReadTimes(arguments.times);
+  const PoseList reference = kitti ? ToPoseList(ReadKittiMatrices(arguments.ground_truth), times_s)
+                                   : ToPoseList(ReadTumTrajectory(arguments.ground_truth));
+  const PoseList estimate = by_row ? ToPoseList(ReadKittiMatrices(arguments.estimate), {})
+                                   : ToPoseList(ReadTumTrajectory(arguments.estimate));
   return {reference.size(), estimate.size(),
           by_row ? MatchByRow(reference, estimate) : MatchByTime(reference, estimate, arguments.max_dt_s)};
 }

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/eval/metrics.h"
+#include "dynamic_slam/io/trajectory_file.h"
 
 namespace dynamic_slam {
 namespace {
@@ -44,11 +45,12 @@ class KnownAnswers : public ::testing::Test {
   }
 
   MatchedPoses Kitti(const std::string& estimate) const {
-    return MatchByRow(ReadKittiPoses(folder_ + "KITTI_00_gt.txt", ""),
-                      ReadKittiPoses(folder_ + estimate, ""));
+    return MatchByRow(ToPoseList(ReadKittiMatrices(folder_ + "KITTI_00_gt.txt"), {}),
+                      ToPoseList(ReadKittiMatrices(folder_ + estimate), {}));
   }
   MatchedPoses Tum(const std::string& reference, const std::string& estimate) const {
-    return MatchByTime(ReadTumPoses(folder_ + reference), ReadTumPoses(folder_ + estimate), 0.01);
+    return MatchByTime(ToPoseList(ReadTumTrajectory(folder_ + reference)),
+                       ToPoseList(ReadTumTrajectory(folder_ + estimate)), 0.01);
   }
 
   std::string folder_;

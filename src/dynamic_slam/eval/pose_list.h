@@ -1,6 +1,6 @@
 #pragma once
 
-#include <string>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -21,14 +21,10 @@ using PoseList = std::vector<EvalPose>;
 
 PoseList ToPoseList(const Trajectory& trajectory);
 
-// Reads lines of "timestamp tx ty tz qx qy qz qw"; '#' starts a comment.
-// Throws InputError with file and line for what is not that, for zero quaternions, stamps that decrease, and
-// files without a pose.
-PoseList ReadTumPoses(const std::string& path);
-
-// Reads lines of 12 numbers, the upper 3x4 part of world_from_cam row by row. The stamps are the row numbers,
-// or, when times_path is not empty, the numbers of that file (one a line, as many as poses). Throws
-// InputError as above.
-PoseList ReadKittiPoses(const std::string& path, const std::string& times_path);
+// From the upper 3x4 parts of world_from_cam, as KITTI's files have them. `times_s` holds a stamp for each;
+// when it is empty, the stamps are the row numbers. Throws InputError when there are more or fewer stamps
+// than poses.
+PoseList ToPoseList(std::span<const Eigen::Matrix<double, 3, 4>> world_from_cam,
+                    std::span<const double> times_s);
 
 }  // namespace dynamic_slam
