@@ -8,7 +8,7 @@ struct OrbOptions {
   int features = 1000;
   int levels = 8;
   double scale_factor = 1.2;
-  int fast_threshold = 20;
+  int fast_threshold = 14;  // on a smoothed image: about 20 without smoothing
   int fast_threshold_min = 7;
 
   template <class Self, class Visitor>
