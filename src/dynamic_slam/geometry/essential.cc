@@ -43,7 +43,9 @@ template <int kA, int kB>
 Univariate<kA + kB - 2> Convolve(const Eigen::Matrix<double, kA, 1>& a,
                                  const Eigen::Matrix<double, kB, 1>& b) {
   Univariate<kA + kB - 2> product = Univariate<kA + kB - 2>::Zero();
-  for (int i = 0; i < kA; ++i) product.template segment<kB>(i) += a[i] * b;
+  for (int i = 0; i < kA; ++i) {
+    for (int j = 0; j < kB; ++j) product[i + j] += a[i] * b[j];
+  }
   return product;
 }
 
@@ -168,6 +170,7 @@ std::array<Rigid3, 4> PosesFromEssential(const Eigen::Matrix3d& E) {
 
 Rigid3 RefineRelativePose(std::span<const PixelPair> pairs, double fx, double fy, double cut_px,
                           int iterations, const Rigid3& second_from_first) {
+  using Vector5 = Eigen::Matrix<double, 5, 1>;
   using Vector9 = Eigen::Matrix<double, 9, 1>;
   const Eigen::DiagonalMatrix<double, 3> inverse_k(1.0 / fx, 1.0 / fy, 1.0);
   const double cut2 = cut_px * cut_px;
@@ -193,9 +196,17 @@ Rigid3 RefineRelativePose(std::span<const PixelPair> pairs, double fx, double fy
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const Eigen::Matrix3d E = EssentialFromPose(pose);
     const Eigen::Matrix3d F = inverse_k * E * inverse_k;
-    // Normal equations in the nine entries of F (row by row), projected to the five parameters below.
-    Eigen::Matrix<double, 9, 9> A9 = Eigen::Matrix<double, 9, 9>::Zero();
-    Vector9 b9 = Vector9::Zero();
+    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(pose.translation);
+    const Eigen::Matrix3d R = pose.Matrix(), T = Skew(pose.translation);
+    Eigen::Matrix<double, 5, 9> D;  // of the entries of F, row by row, by the five parameters
+    for (int k = 0; k < 5; ++k) {
+      const Eigen::Matrix3d dE = k < 3 ? Eigen::Matrix3d(T * Skew(Eigen::Vector3d::Unit(k)) * R)
+                                       : Eigen::Matrix3d(Skew(basis.col(k - 3)) * R);
+      const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> dF = inverse_k * dE * inverse_k;
+      D.row(k) = Vector9::Map(dF.data()).transpose();
+    }
+    Eigen::Matrix<double, 5, 5> A = Eigen::Matrix<double, 5, 5>::Zero();
+    Vector5 b = Vector5::Zero();
     for (const PixelPair& m : pairs) {
       const double a0 = F(0, 0) * m.x1 + F(0, 1) * m.y1 + F(0, 2),
                    a1 = F(1, 0) * m.x1 + F(1, 1) * m.y1 + F(1, 2);
@@ -212,31 +223,20 @@ Rigid3 RefineRelativePose(std::span<const PixelPair> pairs, double fx, double fy
       g << c0 * m.x1 - sb0 * m.x2, c0 * m.y1 - sb1 * m.x2, c0,  //
           c1 * m.x1 - sb0 * m.y2, c1 * m.y1 - sb1 * m.y2, c1,   //
           m.x1 - sb0, m.y1 - sb1, 1;
-      g *= inverse_d;
-      const double w = u * u;
-      const Vector9 wg = w * g;
-      A9.noalias() += wg * g.transpose();
-      b9 += wg * r;
+      Vector5 J = Vector5::Zero();
+      for (int k = 0; k < 9; ++k) J += g[k] * D.col(k);
+      const double w = u * u * inverse_d;
+      A.noalias() += (w * inverse_d) * J * J.transpose();
+      b += (w * r) * J;
     }
-    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(pose.translation);
-    const Eigen::Matrix3d R = pose.Matrix(), T = Skew(pose.translation);
-    Eigen::Matrix<double, 9, 5> D;
-    for (int k = 0; k < 5; ++k) {
-      const Eigen::Matrix3d dE = k < 3 ? Eigen::Matrix3d(T * Skew(Eigen::Vector3d::Unit(k)) * R)
-                                       : Eigen::Matrix3d(Skew(basis.col(k - 3)) * R);
-      const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> dF = inverse_k * dE * inverse_k;
-      D.col(k) = Vector9::Map(dF.data());
-    }
-    Eigen::Matrix<double, 5, 5> A = D.transpose() * A9 * D;
-    const Eigen::Matrix<double, 5, 1> b = D.transpose() * b9;
     A.diagonal() *= 1.0 + damping;
-    const Eigen::Matrix<double, 5, 1> step = -A.ldlt().solve(b);
+    const Vector5 step = -A.ldlt().solve(b);
     if (!step.allFinite()) break;
     const Rigid3 candidate(ExpSo3(step.head<3>()) * pose.rotation,
                            (pose.translation + basis * step.tail<2>()).normalized());
     const double candidate_cost = cost_of(candidate);
     if (candidate_cost < cost) {
-      const bool converged = cost - candidate_cost < 1e-9 * cost;
+      const bool converged = cost - candidate_cost < 1e-7 * cost;
       pose = candidate;
       cost = candidate_cost;
       damping = std::max(damping * 0.1, 1e-9);

@@ -35,6 +35,7 @@ int RealRootsInUnitInterval(const std::array<double, kDegree + 1>& coefficients,
   for (int order = kDegree - 1; order >= 0; --order) {
     const double* p = derivatives[order].data();
     const int degree = kDegree - order;
+    const double tolerance = order == 0 ? 1e-13 : 1e-6;  // brackets need not be exact
     const int bracket_count = count;
     std::copy_n(roots->begin(), bracket_count, brackets.begin());
     count = 0;
@@ -55,7 +56,7 @@ int RealRootsInUnitInterval(const std::array<double, kDegree + 1>& coefficients,
           if (!(next > low && next < high)) next = 0.5 * (low + high);
           const double step = std::abs(next - x);
           x = next;
-          if (step < 1e-13) break;
+          if (step < tolerance) break;
         }
         (*roots)[count++] = x;
       }

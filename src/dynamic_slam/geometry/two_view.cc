@@ -21,6 +21,7 @@ namespace {
 constexpr double kChi2Line = 3.84;   // 95% quantile, 1 degree of freedom: distance to an epipolar line
 constexpr double kChi2Point = 5.99;  // 2 degrees of freedom: distance to a point
 constexpr double kRadToDeg = 180.0 / std::numbers::pi;
+constexpr double kMinPlaneScore = 0.4;  // relative to the epipolar score: below, the scene is far from planar
 constexpr int kLanes = 8;
 
 // Match coordinates relative to the principal point, in px: one array each, filled up with NaN to whole
@@ -166,7 +167,7 @@ class Estimator {
 
   // Keeps a sample's pose, refined on all that fits it, when it is better than what is there.
   void Consider(const Rigid3& sampled, EpipolarModel* best) const {
-    for (const Rigid3& pose : {sampled, Refine(sampled, 5)}) {
+    for (const Rigid3& pose : {sampled, Refine(matches_.pairs, sampled, 5)}) {
       const double score = EpipolarScore(matches_, Fundamental(EssentialFromPose(pose)), options_.sigma_px);
       if (score > best->score) *best = {score, CountEpipolarInliers(pose), pose};
     }
@@ -190,19 +191,19 @@ class Estimator {
     }
   }
 
-  Rigid3 Refine(const Rigid3& pose, int iterations) const {
-    return RefineRelativePose(matches_.pairs, camera_.fx, camera_.fy, 3.0 * options_.sigma_px, iterations,
-                              pose);
+  Rigid3 Refine(std::span<const PixelPair> pairs, const Rigid3& pose, int iterations) const {
+    return RefineRelativePose(pairs, camera_.fx, camera_.fy, 3.0 * options_.sigma_px, iterations, pose);
   }
 
-  std::vector<uint8_t> EpipolarInliers(const Rigid3& pose) const {
+  // Squared epipolar errors over the inlier limit: below 1 for an inlier.
+  std::vector<float> RelativeErrors(const Rigid3& pose) const {
     const Eigen::Matrix3f F = Fundamental(EssentialFromPose(pose));
-    const float limit = static_cast<float>(kChi2Line * options_.sigma_px * options_.sigma_px);
-    std::vector<uint8_t> fits(matches_.size);
+    const float scale = static_cast<float>(1.0 / (kChi2Line * options_.sigma_px * options_.sigma_px));
+    std::vector<float> errors(matches_.size);
     for (size_t i = 0; i < matches_.size; ++i) {
-      fits[i] = EpipolarError(F, matches_.x1[i], matches_.y1[i], matches_.x2[i], matches_.y2[i]) < limit;
+      errors[i] = scale * EpipolarError(F, matches_.x1[i], matches_.y1[i], matches_.x2[i], matches_.y2[i]);
     }
-    return fits;
+    return errors;
   }
 
  private:
@@ -230,8 +231,8 @@ class Estimator {
   }
 
   int CountEpipolarInliers(const Rigid3& pose) const {
-    const auto fits = EpipolarInliers(pose);
-    return static_cast<int>(std::count(fits.begin(), fits.end(), 1));
+    const auto errors = RelativeErrors(pose);
+    return static_cast<int>(std::count_if(errors.begin(), errors.end(), [](float e) { return e < 1; }));
   }
 
   const Camera& camera_;
@@ -240,12 +241,15 @@ class Estimator {
   Eigen::Vector3d k_, inverse_k_;
 };
 
-// What a motion makes of the matches.
+// What a motion makes of the matches. Matches with too little parallax to tell the sign of their depth count
+// as in front: if only triangulated points counted, a wrong motion that makes parallax out of outliers would
+// beat a pure rotation.
 struct Reconstruction {
   Rigid3 second_from_first;
-  int in_front = 0;                    // of the points that could be told
-  int triangulated = 0;                // in front, reprojected well, with parallax
+  double score = 0;  // 1 for each in front without epipolar error, 0 for each at the limit
+  std::vector<uint8_t> is_in_front;
   std::vector<double> parallaxes_deg;  // of all that are in front
+  int triangulated = 0;                // in front, reprojected well, with parallax
   std::vector<uint8_t> is_triangulated;
   std::vector<Eigen::Vector3d> points_in_first;
 
@@ -259,10 +263,12 @@ struct Reconstruction {
   }
 };
 
-Reconstruction Reconstruct(const Camera& camera, const Matches& matches, const std::vector<uint8_t>& use,
-                           const Rigid3& pose, const TwoViewOptions& options) {
+Reconstruction Reconstruct(const Camera& camera, const Matches& matches,
+                           const std::vector<float>& relative_errors, const Rigid3& pose,
+                           const TwoViewOptions& options) {
   Reconstruction result;
   result.second_from_first = pose;
+  result.is_in_front.assign(matches.size, 0);
   result.is_triangulated.assign(matches.size, 0);
   result.points_in_first.resize(matches.size);
   const TwoViewTriangulator triangulator(pose);
@@ -273,15 +279,20 @@ Reconstruction Reconstruct(const Camera& camera, const Matches& matches, const s
     return dx * dx + dy * dy;
   };
   for (size_t i = 0; i < matches.size; ++i) {
-    if (!use[i]) continue;
+    if (!(relative_errors[i] < 1)) continue;
     const Eigen::Vector3d& first_ray = matches.first_rays[i];
     const Eigen::Vector3d& second_ray = matches.second_rays[i];
-    const auto point = triangulator.Triangulate(first_ray, second_ray);
-    if (!point) continue;
     const double parallax_deg = kRadToDeg * ParallaxAngle(R * first_ray, second_ray);
+    const bool has_parallax = parallax_deg >= options.min_point_parallax_deg;
+    std::optional<Eigen::Vector3d> point;
+    if (has_parallax) {
+      point = triangulator.Triangulate(first_ray, second_ray);
+      if (!point) continue;
+    }
+    result.is_in_front[i] = 1;
+    result.score += 1.0 - relative_errors[i];
     result.parallaxes_deg.push_back(parallax_deg);
-    ++result.in_front;
-    if (parallax_deg < options.min_point_parallax_deg) continue;
+    if (!has_parallax) continue;
     if (error2(*point, first_ray) > limit || error2(pose * *point, second_ray) > limit) continue;
     ++result.triangulated;
     result.is_triangulated[i] = 1;
@@ -310,7 +321,7 @@ std::string Explain(const TwoViewResult& result) {
       return fmt::format("parallax {:.1f} deg < {:.1f} deg; move sideways", result.value, result.limit);
     case TwoViewFailure::kAmbiguous:
       return fmt::format(
-          "two motions fit: the second has {:.2f} of the points of the first > {:.2f}; "
+          "two motions fit: the second scores {:.2f} of the first > {:.2f}; "
           "show something out of the plane",
           result.value, result.limit);
     case TwoViewFailure::kTooFewPoints:
@@ -346,36 +357,45 @@ TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vecto
   result.inliers = result.from_homography ? plane.inliers : epipolar.inliers;
   if (result.inliers < least) return fail(TwoViewFailure::kTooFewInliers, result.inliers, least);
 
-  // Try every motion. Those from a plane are refined first, since what lies off the plane tells them apart.
-  std::vector<Rigid3> motions;
-  if (result.from_homography) {
-    for (const Rigid3& motion : PosesFromHomography(plane.second_H_first)) {
-      if (motion.translation.squaredNorm() > 0) motions.push_back(estimator.Refine(motion, 10));
-    }
-  } else {
-    const Rigid3 refined = estimator.Refine(epipolar.pose, 20);
-    for (const Rigid3& motion : PosesFromEssential(EssentialFromPose(refined))) motions.push_back(motion);
+  // Try every motion of both models: near a plane either may have found the wrong one of two that fit.
+  std::vector<Rigid3> origins = {epipolar.pose};
+  if (plane.score > kMinPlaneScore * epipolar.score) {
+    const auto of_plane = PosesFromHomography(plane.second_H_first);
+    for (size_t i = 0; i < of_plane.size(); i += 2) origins.push_back(of_plane[i]);  // pairs of +-t
   }
   std::vector<Reconstruction> tried;
-  for (const Rigid3& motion : motions) {
-    tried.push_back(Reconstruct(camera, matches, estimator.EpipolarInliers(motion), motion, options));
+  const auto by_score = [](const Reconstruction& a, const Reconstruction& b) { return a.score < b.score; };
+  for (const Rigid3& origin : origins) {
+    if (origin.translation.squaredNorm() == 0) continue;
+    const Rigid3 refined = estimator.Refine(matches.pairs, origin, 10);
+    const auto begin = static_cast<std::ptrdiff_t>(tried.size());
+    for (const Rigid3& motion : PosesFromEssential(EssentialFromPose(refined))) {
+      tried.push_back(Reconstruct(camera, matches, estimator.RelativeErrors(motion), motion, options));
+    }
+    // Matches behind the cameras are wrong and, far from where they belong, pull hard: refine without.
+    Reconstruction& one = *std::max_element(tried.begin() + begin, tried.end(), by_score);
+    std::vector<PixelPair> in_front;
+    for (size_t i = 0; i < matches.size; ++i) {
+      if (one.is_in_front[i]) in_front.push_back(matches.pairs[i]);
+    }
+    const Rigid3 cleaned = estimator.Refine(in_front, one.second_from_first, 10);
+    one = Reconstruct(camera, matches, estimator.RelativeErrors(cleaned), cleaned, options);
   }
   if (tried.empty()) return fail(TwoViewFailure::kLowParallax, 0, options.min_parallax_deg);
-  Reconstruction& best = *std::max_element(tried.begin(), tried.end(), [](const auto& a, const auto& b) {
-    return a.triangulated < b.triangulated;
-  });
-  int second_best = 0;
+  Reconstruction& best = *std::max_element(tried.begin(), tried.end(), by_score);
+  double second_best_score = 0;
   for (const Reconstruction& other : tried) {
     if (AreDifferent(best.second_from_first, other.second_from_first)) {
-      second_best = std::max(second_best, other.triangulated);
+      second_best_score = std::max(second_best_score, other.score);
     }
   }
+  const double rivalry = best.score > 0 ? second_best_score / best.score : 1.0;
+
   result.second_from_first = best.second_from_first;
   result.parallax_deg = best.ParallaxDeg(options.min_points);
   if (result.parallax_deg < options.min_parallax_deg) {
     return fail(TwoViewFailure::kLowParallax, result.parallax_deg, options.min_parallax_deg);
   }
-  const double rivalry = static_cast<double>(second_best) / std::max(best.triangulated, 1);
   if (rivalry > options.max_second_best_ratio) {
     return fail(TwoViewFailure::kAmbiguous, rivalry, options.max_second_best_ratio);
   }

@@ -38,9 +38,10 @@ struct TwoViewOptions {
     visit("max_homography_score_ratio", self.max_homography_score_ratio,
           OptionField{"", 0, 1,
                       "Share of the homography in both scores above which the scene counts as planar."});
-    visit("max_second_best_ratio", self.max_second_best_ratio,
-          OptionField{"", 0, 1,
-                      "Points of the second best motion, relative to the best, that make it ambiguous."});
+    visit(
+        "max_second_best_ratio", self.max_second_best_ratio,
+        OptionField{"", 0, 1,
+                    "Score of the second best motion, relative to the best, above which neither is taken."});
     visit("ransac_confidence", self.ransac_confidence,
           OptionField{"", 0.5, 0.999999, "Probability of having drawn a sample without outliers."});
     visit("min_ransac_iterations", self.min_ransac_iterations,

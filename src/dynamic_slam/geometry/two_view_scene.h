@@ -61,8 +61,8 @@ inline Eigen::Vector2d Noise(double sigma_px, Random& random) {
 
 // `count` matches of points with depth_of(pixel, random) in the first camera.
 template <class DepthOf>
-MatchSet MakeMatches(const Camera& camera, const Rigid3& second_from_first, int count, double sigma_px, Random& random,
-                     DepthOf&& depth_of) {
+MatchSet MakeMatches(const Camera& camera, const Rigid3& second_from_first, int count, double sigma_px,
+                     Random& random, DepthOf&& depth_of) {
   MatchSet set;
   while (static_cast<int>(set.first_px.size()) < count) {
     const Eigen::Vector2d px = RandomPixel(camera, random);
