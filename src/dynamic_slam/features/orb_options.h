@@ -8,7 +8,7 @@ struct OrbOptions {
   int features = 1000;
   int levels = 8;
   double scale_factor = 1.2;
-  int fast_threshold = 14;  // on a smoothed image: about 20 without smoothing
+  int fast_threshold = 16;
   int fast_threshold_min = 7;
 
   template <class Self, class Visitor>
@@ -17,9 +17,9 @@ struct OrbOptions {
     visit("levels", self.levels, OptionField{"", 1, 12, "Levels of the image pyramid."});
     visit("scale_factor", self.scale_factor, OptionField{"", 1.05, 2.0, "Scale between two pyramid levels."});
     visit("fast_threshold", self.fast_threshold,
-          OptionField{"grey levels", 1, 255, "FAST contrast threshold where texture is plenty."});
+          OptionField{"grey levels", 1, 255, "FAST contrast preferred; weaker corners fill the gaps."});
     visit("fast_threshold_min", self.fast_threshold_min,
-          OptionField{"grey levels", 1, 255, "FAST contrast threshold where texture is scarce."});
+          OptionField{"grey levels", 1, 255, "FAST contrast that every corner has at least."});
   }
 };
 
