@@ -306,6 +306,10 @@ bool AreDifferent(const Rigid3& a, const Rigid3& b) {
   return RotationAngle(a.rotation, b.rotation) > 0.02 || ParallaxAngle(a.translation, b.translation) > 0.1;
 }
 
+TwoViewMotion TakeMotion(Reconstruction&& from) {
+  return {from.second_from_first, std::move(from.is_triangulated), std::move(from.points_in_first), from.triangulated};
+}
+
 }  // namespace
 
 std::string Explain(const TwoViewResult& result) {
@@ -335,8 +339,8 @@ TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vecto
                               Random& random) {
   DS_CHECK(first_px.size() == second_px.size(), "{} and {} pixels", first_px.size(), second_px.size());
   TwoViewResult result;
-  result.is_inlier.assign(first_px.size(), 0);
-  result.points_in_first.assign(first_px.size(), Eigen::Vector3d::Zero());
+  result.motion.is_inlier.assign(first_px.size(), 0);
+  result.motion.points_in_first.assign(first_px.size(), Eigen::Vector3d::Zero());
   const auto fail = [&result](TwoViewFailure failure, double value, double limit) {
     result.failure = failure;
     result.value = value;
@@ -382,28 +386,34 @@ TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vecto
     one = Reconstruct(camera, matches, estimator.RelativeErrors(cleaned), cleaned, options);
   }
   if (tried.empty()) return fail(TwoViewFailure::kLowParallax, 0, options.min_parallax_deg);
-  Reconstruction& best = *std::max_element(tried.begin(), tried.end(), by_score);
-  double second_best_score = 0;
-  for (const Reconstruction& other : tried) {
-    if (AreDifferent(best.second_from_first, other.second_from_first)) {
-      second_best_score = std::max(second_best_score, other.score);
+  std::stable_sort(tried.begin(), tried.end(),
+                   [](const Reconstruction& a, const Reconstruction& b) { return a.score > b.score; });
+  Reconstruction& best = tried.front();
+  std::vector<Reconstruction*> rivals;
+  for (Reconstruction& other : tried) {
+    bool is_new = AreDifferent(best.second_from_first, other.second_from_first);
+    for (const Reconstruction* rival : rivals) {
+      is_new = is_new && AreDifferent(rival->second_from_first, other.second_from_first);
     }
+    if (is_new) rivals.push_back(&other);
   }
-  const double rivalry = best.score > 0 ? second_best_score / best.score : 1.0;
+  const double rivalry = best.score <= 0 ? 1.0 : rivals.empty() ? 0.0 : rivals.front()->score / best.score;
 
-  result.second_from_first = best.second_from_first;
   result.parallax_deg = best.ParallaxDeg(options.min_points);
+  const double best_score = best.score;
   if (result.parallax_deg < options.min_parallax_deg) {
     return fail(TwoViewFailure::kLowParallax, result.parallax_deg, options.min_parallax_deg);
   }
-  if (rivalry > options.max_second_best_ratio) {
-    return fail(TwoViewFailure::kAmbiguous, rivalry, options.max_second_best_ratio);
-  }
-  if (best.triangulated < options.min_points) {
+  if (rivalry <= options.max_second_best_ratio && best.triangulated < options.min_points) {
     return fail(TwoViewFailure::kTooFewPoints, best.triangulated, options.min_points);
   }
-  result.is_inlier = std::move(best.is_triangulated);
-  result.points_in_first = std::move(best.points_in_first);
+  result.motion = TakeMotion(std::move(best));
+  if (rivalry > options.max_second_best_ratio) {
+    for (Reconstruction* rival : rivals) {
+      if (rival->score > options.max_second_best_ratio * best_score) result.rivals.push_back(TakeMotion(std::move(*rival)));
+    }
+    return fail(TwoViewFailure::kAmbiguous, rivalry, options.max_second_best_ratio);
+  }
   return result;
 }
 

@@ -60,6 +60,14 @@ enum class TwoViewFailure {
   kTooFewPoints,
 };
 
+// One motion that explains the matches, and what it makes of them.
+struct TwoViewMotion {
+  Rigid3 second_from_first;                      // |translation| = 1
+  std::vector<uint8_t> is_inlier;                // per match: triangulated
+  std::vector<Eigen::Vector3d> points_in_first;  // per match; unset where !is_inlier
+  int points = 0;
+};
+
 struct TwoViewResult {
   TwoViewFailure failure = TwoViewFailure::kNone;
   double value = 0;  // what was found wanting (matches, inliers, deg, ratio, points), and
@@ -69,10 +77,8 @@ struct TwoViewResult {
   int inliers = 0;  // matches that fit the chosen model
   double parallax_deg =
       0;  // reached by a quarter of the points in front of both cameras, and by min_points of them
-  Rigid3 second_from_first;  // |translation| = 1
-
-  std::vector<uint8_t> is_inlier;                // per match: triangulated
-  std::vector<Eigen::Vector3d> points_in_first;  // per match; unset where !is_inlier
+  TwoViewMotion motion;
+  std::vector<TwoViewMotion> rivals;  // kAmbiguous: the others that explain the matches about as well
 
   bool Succeeded() const { return failure == TwoViewFailure::kNone; }
 };
@@ -83,7 +89,8 @@ std::string Explain(const TwoViewResult& result);
 // Relative pose and structure from matches of one camera in two places (`first_px[i]` matches `second_px[i]`,
 // ideal px). An essential matrix (five points) and a homography compete as in Mur-Artal, Montiel and Tardos,
 // "ORB-SLAM", 2015, section IV; the winner's motions are tried on the points, and the clear best one is
-// refined. On failure the pose and the points are what was known until then: do not use them.
+// refined. On failure the motion is what was known until then: do not use it, but for kAmbiguous, where further views
+// can tell it from its rivals.
 TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vector2d> first_px,
                               std::span<const Eigen::Vector2d> second_px, const TwoViewOptions& options,
                               Random& random);

@@ -41,14 +41,14 @@ Errors RunSeeds(const Camera& camera, const Rigid3& truth, const std::function<M
     errors.from_homography += result.from_homography;
     if (!result.Succeeded()) continue;
     ++errors.successes;
-    errors.rotation_deg.push_back(Degrees(RotationAngle(result.second_from_first.rotation, truth.rotation)));
+    errors.rotation_deg.push_back(Degrees(RotationAngle(result.motion.second_from_first.rotation, truth.rotation)));
     errors.translation_deg.push_back(
-        Degrees(ParallaxAngle(result.second_from_first.translation, truth.translation)));
-    EXPECT_NEAR(result.second_from_first.translation.norm(), 1, 1e-12);
+        Degrees(ParallaxAngle(result.motion.second_from_first.translation, truth.translation)));
+    EXPECT_NEAR(result.motion.second_from_first.translation.norm(), 1, 1e-12);
     int points = 0, wrong = 0;
     for (size_t i = 0; i < set.is_true.size(); ++i) {
-      points += result.is_inlier[i];
-      wrong += result.is_inlier[i] && !set.is_true[i];
+      points += result.motion.is_inlier[i];
+      wrong += result.motion.is_inlier[i] && !set.is_true[i];
     }
     errors.wrong_ratio.push_back(static_cast<double>(wrong) / points);
   }
@@ -63,11 +63,11 @@ TEST(TwoView, IsExactForExactMatches) {
   ASSERT_TRUE(result.Succeeded()) << Explain(result);
   EXPECT_FALSE(result.from_homography);
   EXPECT_EQ(result.inliers, 300);
-  EXPECT_LT(RotationAngle(result.second_from_first.rotation, kSideways.rotation), 1e-6);
+  EXPECT_LT(RotationAngle(result.motion.second_from_first.rotation, kSideways.rotation), 1e-6);
   const double scale = kSideways.translation.norm();
   for (size_t i = 0; i < set.points_in_first.size(); ++i) {
-    ASSERT_TRUE(result.is_inlier[i]);
-    EXPECT_LT((scale * result.points_in_first[i] - set.points_in_first[i]).norm(), 1e-3);
+    ASSERT_TRUE(result.motion.is_inlier[i]);
+    EXPECT_LT((scale * result.motion.points_in_first[i] - set.points_in_first[i]).norm(), 1e-3);
   }
 }
 
@@ -201,7 +201,7 @@ TEST(TwoView, RefusalsSayWhyWithNumbers) {
   EXPECT_GT(result.value, 0.2);
   EXPECT_LT(result.value, 1.0);
   EXPECT_THAT(Explain(result), testing::MatchesRegex("parallax 0\\.[0-9] deg < 1\\.0 deg; move sideways"));
-  EXPECT_THAT(result.is_inlier, testing::Each(0));
+  EXPECT_THAT(result.motion.is_inlier, testing::Each(0));
 }
 
 TEST(TwoView, RepeatsItselfForTheSameSeed) {
@@ -212,8 +212,8 @@ TEST(TwoView, RepeatsItselfForTheSameSeed) {
   Random a(7), b(7);
   const TwoViewResult first = EstimateTwoView(camera, set.first_px, set.second_px, {}, a);
   const TwoViewResult second = EstimateTwoView(camera, set.first_px, set.second_px, {}, b);
-  EXPECT_EQ(first.second_from_first.translation, second.second_from_first.translation);
-  EXPECT_EQ(first.is_inlier, second.is_inlier);
+  EXPECT_EQ(first.motion.second_from_first.translation, second.motion.second_from_first.translation);
+  EXPECT_EQ(first.motion.is_inlier, second.motion.is_inlier);
 }
 
 }  // namespace

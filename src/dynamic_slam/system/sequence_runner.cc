@@ -96,6 +96,15 @@ void WriteText(const std::filesystem::path& file, const std::string& text) {
   }
 }
 
+std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
+  std::string csv = "timestamp,state,keypoints,inliers,new_keyframes,tracking_ms,reason\n";
+  for (const RunSummary::FrameRecord& frame : frames) {
+    csv += fmt::format("{:.9f},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state), frame.keypoints,
+                       frame.inliers, frame.new_keyframes, frame.tracking_ms, frame.reason);
+  }
+  return csv;
+}
+
 }  // namespace
 
 TimeStatistics SummariseTimes(std::vector<double> times) {
@@ -135,6 +144,9 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system,
       summary.initialised_at.reset();
     }
     was_tracking = tracking;
+    summary.frames.push_back({image->timestamp_s, result.tracking.state, result.tracking.keypoints,
+                              result.tracking.inliers, static_cast<int>(result.tracking.new_keyframes.size()),
+                              result.tracking_ms, result.tracking.reason});
     summary.last_reason = tracking ? "" : result.tracking.reason;
     ++frames;
     const RunProgress progress{frames, source.FrameCount(), &result, &system.map()};
@@ -179,6 +191,7 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
     for (const StampedPose& pose : trajectory) poses.push_back(pose.world_from_cam);
     WriteKittiPoses(kitti, poses);
   }
+  WriteText(folder / "frames.csv", FramesCsv(summary.frames));
   std::vector<Eigen::Vector3f> points;
   system.map().landmarks().ForEach(
       [&points](const Landmark& landmark) { points.push_back(landmark.position().cast<float>()); });

@@ -39,6 +39,16 @@ struct RunSummary {
   bool interrupted = false;
   std::string last_reason;               // what tracking said last, while it had no pose
   std::vector<SourceProblem> skipped;    // images that could not be used
+
+  // One line of frames.csv.
+  struct FrameRecord {
+    double timestamp_s = 0;
+    TrackingState state = TrackingState::kInitialising;
+    int keypoints = 0, inliers = 0, new_keyframes = 0;
+    double tracking_ms = 0;
+    std::string reason;
+  };
+  std::vector<FrameRecord> frames;
   double Coverage() const {
     return frames_total == 0 ? 0 : static_cast<double>(frames_tracked + frames_backfilled) / static_cast<double>(frames_total);
   }
@@ -55,7 +65,7 @@ struct RunProgress {
 // each image; returning false ends the run early, with all results so far.
 RunSummary RunSequence(FrameSource& source, SlamSystem& system, const std::function<bool(const RunProgress&)>& on_frame);
 
-// Writes trajectory.txt, keyframes.txt, map.ply, config.yaml, summary.json and, for a KITTI source in which every frame
+// Writes trajectory.txt, keyframes.txt, frames.csv, map.ply, config.yaml, summary.json and, for a KITTI source in which every frame
 // has a pose, trajectory_kitti.txt into the folder, which is made. Throws InputError when that is not possible.
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);
 

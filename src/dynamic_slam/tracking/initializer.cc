@@ -1,28 +1,40 @@
 #include "dynamic_slam/tracking/initializer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
-
-#include "dynamic_slam/optimize/bundle_adjustment.h"
-
 namespace dynamic_slam {
 namespace {
 
 constexpr double kMatchRatio = 0.9;
 
+// Views beside the outer two: they make the first map more exact, and tell motions apart.
+constexpr size_t kMaxViewsBetween = 6;
+
+// Standard errors by which the better of two motions must be better. Errors of one scene are not independent, so more
+// than the usual three.
+constexpr double kMinPreference = 5.0;
+
 }  // namespace
 
-Initializer::Initializer(const Camera& camera, const InitializerOptions& options) : camera_(camera), options_(options) {
+Initializer::Initializer(const Camera& camera, const InitializerOptions& options, std::vector<float> octave_scales)
+    : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)) {
   Reset();
 }
 
 void Initializer::Reset() {
   reference_.reset();
+  views_ = {};
   reason_ = "waiting for the first image";
 }
 
 void Initializer::StartFrom(const Frame& frame) {
   reference_ = frame;
+  views_ = {};
+  for (uint32_t i = 0; i < frame.features.size(); ++i) {
+    const Keypoint& keypoint = frame.features.keypoints[i];
+    views_.reference.push_back({i, {keypoint.x, keypoint.y}, ScaleOf(keypoint)});
+  }
   last_places_.resize(frame.features.size());
   for (size_t i = 0; i < last_places_.size(); ++i) {
     last_places_[i] = {frame.features.keypoints[i].x, frame.features.keypoints[i].y};
@@ -82,48 +94,68 @@ bool Initializer::TryFrame(Frame* frame, Random& random, Map* map) {
     StartFrom(*frame);
     return false;
   }
+  AddView(*frame, matches);
   std::vector<Eigen::Vector2d> first_px, second_px;
-  for (const Match& match : matches) {
-    const Keypoint& first = reference_->features.keypoints[match.first];
-    const Keypoint& second = frame->features.keypoints[match.second];
-    first_px.emplace_back(first.x, first.y);
-    second_px.emplace_back(second.x, second.y);
+  for (const Sighting& sighting : views_.last) {
+    first_px.push_back(views_.reference[sighting.reference_keypoint].ideal_px);
+    second_px.push_back(sighting.ideal_px);
   }
   const TwoViewResult motion = EstimateTwoView(camera_, first_px, second_px, options_.two_view, random);
-  if (!motion.Succeeded()) {
+  if (!motion.Succeeded() && motion.failure != TwoViewFailure::kAmbiguous) {
     reason_ = "initialising: " + Explain(motion);
     return false;
   }
-  return BuildMap(motion, matches, frame, map);
+  const std::optional<InitialStructure> structure = ChooseStructure(motion);
+  if (!structure.has_value()) return false;
+  reason_ = fmt::format("initialised: {} points, parallax {:.1f} deg, {} views", structure->points,
+                        motion.parallax_deg, views_.between.size() + 2);
+  BuildMap(*structure, matches, frame, map);
+  return true;
 }
 
-bool Initializer::BuildMap(const TwoViewResult& motion, const std::vector<Match>& matches, Frame* frame, Map* map) {
-  BundleProblem problem;
-  problem.poses = {{Rigid3(), true}, {motion.second_from_first, false}};
-  std::vector<Match> used;
-  const std::vector<float>& scales = map->octave_scales();
-  for (size_t i = 0; i < matches.size(); ++i) {
-    if (motion.is_inlier[i] == 0) continue;
-    const uint32_t point = static_cast<uint32_t>(used.size());
-    const Keypoint& first = reference_->features.keypoints[matches[i].first];
-    const Keypoint& second = frame->features.keypoints[matches[i].second];
-    problem.points.push_back({motion.points_in_first[i], false});
-    problem.observations.push_back({0, point, {first.x, first.y}, 1.0 / scales[static_cast<size_t>(first.octave)], 1.0});
-    problem.observations.push_back({1, point, {second.x, second.y}, 1.0 / scales[static_cast<size_t>(second.octave)], 1.0});
-    used.push_back(matches[i]);
+void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches) {
+  if (!views_.last.empty()) views_.between.push_back(std::move(views_.last));
+  // Of too many views every second one is enough.
+  if (views_.between.size() > kMaxViewsBetween) {
+    for (size_t i = 0; 2 * i + 1 < views_.between.size(); ++i) views_.between[i] = std::move(views_.between[2 * i + 1]);
+    views_.between.resize(views_.between.size() / 2);
   }
-  BundleOptions bundle;
-  bundle.max_iterations = 20;
-  std::vector<uint8_t> is_outlier;
-  const BundleSummary summary = AdjustBundle(camera_, bundle, {}, &problem, &is_outlier);
-  std::vector<double> depths;
-  for (size_t i = 0; i < used.size(); ++i) {
-    if (is_outlier[2 * i] == 0 && is_outlier[2 * i + 1] == 0) depths.push_back(problem.points[i].position.z());
+  views_.last.clear();
+  for (const Match& match : matches) {
+    const Keypoint& keypoint = frame.features.keypoints[match.second];
+    views_.last.push_back({match.first, {keypoint.x, keypoint.y}, ScaleOf(keypoint)});
   }
-  if (!summary.usable || static_cast<int>(depths.size()) < options_.two_view.min_points) {
-    reason_ = fmt::format("initialising: {} points survive the first bundle adjustment < {}", depths.size(),
+}
+
+std::optional<InitialStructure> Initializer::ChooseStructure(const TwoViewResult& result) {
+  InitialStructure best = RefineMotion(camera_, result.motion, views_);
+  double certainty = kMinPreference;
+  for (const TwoViewMotion& rival : result.rivals) {
+    InitialStructure other = RefineMotion(camera_, rival, views_);
+    const double preference = Preference(best, other);
+    if (getenv("DS_DEBUG")) { auto m=[](const InitialStructure& q){double t=0; for(double c:q.costs)t+=c; return t/q.costs.size();}; fmt::print(stderr,"rival pref {:.2f} mean cost {:.3f} {:.3f} points {} {} views {} matches {}\n", preference, m(best), m(other), best.points, other.points, views_.between.size()+2, views_.last.size()); }
+    if (preference < 0) std::swap(best, other);
+    certainty = std::min(certainty, std::abs(preference));
+  }
+  if (certainty < kMinPreference) {
+    reason_ = fmt::format("initialising: two motions fit {} views, certainty {:.1f} < {:.1f}; show something out of the plane",
+                          views_.between.size() + 2, certainty, kMinPreference);
+    return std::nullopt;
+  }
+  if (!best.usable || best.points < options_.two_view.min_points) {
+    reason_ = fmt::format("initialising: {} points survive the first bundle adjustment < {}", best.points,
                           options_.two_view.min_points);
-    return false;
+    return std::nullopt;
+  }
+    if (getenv("DS_DEBUG")) { auto m=[](const InitialStructure& q){double t=0; for(double c:q.costs)t+=c; return t/q.costs.size();}; fmt::print(stderr,"accept cost {:.3f} points {} views {} matches {} rivals {} parallax {:.2f}\n", m(best), best.points, views_.between.size()+2, views_.last.size(), result.rivals.size(), result.parallax_deg); }
+  return best;
+}
+
+void Initializer::BuildMap(const InitialStructure& structure, const std::vector<Match>& matches, Frame* frame,
+                           Map* map) {
+  std::vector<double> depths;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (structure.is_good[i] != 0) depths.push_back(structure.points_in_reference[i].z());
   }
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
@@ -131,26 +163,23 @@ bool Initializer::BuildMap(const TwoViewResult& motion, const std::vector<Match>
 
   reference_->cam_from_world = Rigid3();
   reference_->ClearLandmarks();
-  frame->cam_from_world = problem.poses[1].cam_from_world;
+  frame->cam_from_world = structure.last_from_reference;
   frame->cam_from_world.translation *= scale;
   frame->ClearLandmarks();
   const KeyframeId first_id = InsertKeyframe(*reference_, map);
   const KeyframeId second_id = InsertKeyframe(*frame, map);
-  for (size_t i = 0; i < used.size(); ++i) {
-    if (is_outlier[2 * i] != 0 || is_outlier[2 * i + 1] != 0) continue;
-    const Eigen::Vector3d position = scale * problem.points[i].position;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (structure.is_good[i] == 0) continue;
+    const Eigen::Vector3d position = scale * structure.points_in_reference[i];
     const LandmarkId id = map->AddLandmark(position, second_id).id();
-    map->Link(first_id, used[i].first, id);
-    map->Link(second_id, used[i].second, id);
+    map->Link(first_id, matches[i].first, id);
+    map->Link(second_id, matches[i].second, id);
     map->RefreshLandmark(id);
-    frame->landmarks[used[i].second] = id;
-    frame->points[used[i].second] = position;
+    frame->landmarks[matches[i].second] = id;
+    frame->points[matches[i].second] = position;
   }
   frame->reference = second_id;
   frame->cam_from_reference = Rigid3();
-  reason_ = fmt::format("initialised: {} points, parallax {:.1f} deg, {}", depths.size(), motion.parallax_deg,
-                        motion.from_homography ? "planar scene" : "general scene");
-  return true;
 }
 
 }  // namespace dynamic_slam

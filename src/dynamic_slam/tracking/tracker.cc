@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <cstdlib>
 
 namespace dynamic_slam {
 namespace {
@@ -33,7 +34,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       map_(map),
       bounds_(camera.IdealBounds()),
       extractor_(orb, camera),
-      initializer_(camera, options.initializer),
+      initializer_(camera, options.initializer, map->octave_scales()),
       pose_tracker_(camera, options, map->octave_scales()),
       random_(seed) {}
 
@@ -122,7 +123,10 @@ bool Tracker::TrackFrame() {
 bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
   view_builder_.Build(*map_, frame_.landmarks, options_.local_keyframes, &view_);
   if (!view_.reference.IsValid()) return false;
-  inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px, &frame_, &in_view_);
+  inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px*(getenv("DS_W")?atof(getenv("DS_W")):1.0), &frame_, &in_view_);
+  if (getenv("DS_DEBUG")) { int v=0; for (auto x: in_view_) v+=x; fmt::print(stderr,"frame {} inl {} of view {} local {}\n", frame_.id.value(), inliers_, v, view_.size()); }
+  if (getenv("DS_PASS2")) inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px, &frame_, &in_view_);
+  if (getenv("DS_DEBUG")) { int v=0; for (auto x: in_view_) v+=x; fmt::print(stderr,"frame {} inl {} of view {} local {} again\n", frame_.id.value(), inliers_, v, view_.size()); }
   if (inliers_ >= min_inliers) return true;
   reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
   return false;
@@ -169,10 +173,12 @@ void Tracker::InsertKeyframeIfDue(TrackingResult* result) {
   for (const LandmarkId id : map_->keyframes().At(frame_.reference).landmarks()) {
     if (id.IsValid() && map_->landmarks().At(id).observations().size() >= well_observed) ++input.reference_landmarks;
   }
+  if (getenv("DS_PEAK")) { peak_ = std::max(peak_, inliers_); input.reference_landmarks = peak_; }
   result->keyframe_reason = DecideKeyframe(input, options_.keyframe);
   if (result->keyframe_reason == KeyframeReason::kNone) return;
   last_keyframe_ = InsertKeyframe(frame_, map_);
   last_keyframe_frame_ = frame_.id;
+  peak_ = 0;
   frame_.reference = last_keyframe_;
   frame_.cam_from_reference = Rigid3();
   result->new_keyframes.push_back(last_keyframe_);

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/geometry/rigid3.h"
+#include "dynamic_slam/geometry/two_view.h"
+
+namespace dynamic_slam {
+
+// Where a view sees a keypoint of the reference view.
+struct Sighting {
+  uint32_t reference_keypoint = 0;
+  Eigen::Vector2d ideal_px = Eigen::Vector2d::Zero();
+  double sigma_px = 1;  // scale of its octave
+};
+
+// The views of which the first map is made: the reference at the origin, the last one, whose matches gave the motion,
+// and some between. One reference keypoint has at most one sighting in each.
+struct InitialViews {
+  std::vector<Sighting> reference;             // all its keypoints: entry i is keypoint i
+  std::vector<std::vector<Sighting>> between;  // in the order of time
+  std::vector<Sighting> last;                  // one for each match
+};
+
+// A two-view motion after bundle adjustment over all views.
+struct InitialStructure {
+  bool usable = false;
+  Rigid3 last_from_reference;
+  std::vector<Eigen::Vector3d> points_in_reference;  // per match
+  std::vector<uint8_t> is_good;                      // per match: in front of and near its sighting in both outer views
+  std::vector<double> costs;                         // per match: squared errors of all its sightings, in sigmas, each cut
+                                                     // off at the outlier limit
+  int points = 0;
+};
+
+InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views);
+
+// How sure it is that `a` fits the views better than `b`: the mean difference of their costs over matches, in standard
+// errors of that mean. A scene close to a plane allows two motions between two views, but not between three.
+double Preference(const InitialStructure& a, const InitialStructure& b);
+
+}  // namespace dynamic_slam
