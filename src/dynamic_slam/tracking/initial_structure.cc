@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <numeric>
 
+#include "dynamic_slam/geometry/triangulation.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 #include "dynamic_slam/optimize/pose_optimizer.h"
 
@@ -11,6 +14,8 @@ namespace dynamic_slam {
 namespace {
 
 constexpr double kChi2TwoDof = 5.991;
+constexpr double kFarBaselines = 200;
+constexpr double kMinParallaxRad = 0.3 * std::numbers::pi / 180.0;  // less leaves the depth open
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 // Too few sightings say nothing of a view's pose.
@@ -22,20 +27,23 @@ BundleProblem::Observation MakeObservation(uint32_t pose, uint32_t point, const 
 
 }  // namespace
 
+double InitialStructure::MeanCost() const {
+  return std::accumulate(costs.begin(), costs.end(), 0.0) / static_cast<double>(std::max<size_t>(costs.size(), 1));
+}
+
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views) {
   InitialStructure structure;
   BundleProblem problem;
   problem.poses = {{Rigid3(), true}, {motion.second_from_first, false}};
   std::vector<uint32_t> point_of_keypoint(views.reference.size(), kNone);
-  std::vector<uint32_t> match_of_point;
   for (uint32_t i = 0; i < views.last.size(); ++i) {
-    if (motion.is_inlier[i] == 0) continue;
-    const uint32_t point = static_cast<uint32_t>(problem.points.size());
-    point_of_keypoint[views.last[i].reference_keypoint] = point;
-    match_of_point.push_back(i);
-    problem.points.push_back({motion.points_in_first[i], false});
-    problem.observations.push_back(MakeObservation(0, point, views.reference[views.last[i].reference_keypoint]));
-    problem.observations.push_back(MakeObservation(1, point, views.last[i]));
+    const Sighting& in_reference = views.reference[views.last[i].reference_keypoint];
+    point_of_keypoint[in_reference.reference_keypoint] = i;
+    // What two views cannot place starts far away: motions can be compared only when each has to explain every match.
+    const Eigen::Vector3d far = kFarBaselines * camera.Unproject(in_reference.ideal_px);
+    problem.points.push_back({motion.is_inlier[i] != 0 ? motion.points_in_first[i] : far, false});
+    problem.observations.push_back(MakeObservation(0, i, in_reference));
+    problem.observations.push_back(MakeObservation(1, i, views.last[i]));
   }
 
   // The views between start from their neighbour's pose, backwards from the last one.
@@ -67,15 +75,7 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
   std::vector<uint8_t> is_outlier;
   structure.usable = AdjustBundle(camera, options, {}, &problem, &is_outlier).usable;
   structure.last_from_reference = problem.poses[1].cam_from_world;
-  structure.points_in_reference.assign(views.last.size(), Eigen::Vector3d::Zero());
-  structure.is_good.assign(views.last.size(), 0);
   structure.costs.assign(views.last.size(), 0);
-  for (size_t point = 0; point < problem.points.size(); ++point) {
-    const uint32_t match = match_of_point[point];
-    structure.points_in_reference[match] = problem.points[point].position;
-    structure.is_good[match] = is_outlier[2 * point] == 0 && is_outlier[2 * point + 1] == 0;
-    structure.points += structure.is_good[match];
-  }
   for (const BundleProblem::Observation& observation : problem.observations) {
     const Eigen::Vector3d x_in_cam =
         problem.poses[observation.pose].cam_from_world * problem.points[observation.point].position;
@@ -84,11 +84,16 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
       cost = (camera.Project(x_in_cam) - observation.ideal_px).squaredNorm() * observation.inverse_sigma_px *
              observation.inverse_sigma_px;
     }
-    structure.costs[match_of_point[observation.point]] += std::min(cost, kChi2TwoDof);
+    structure.costs[observation.point] += std::min(cost, kChi2TwoDof);
   }
-  // A match that the motion cannot place at all fits as badly as can be in the two outer views.
+  const Eigen::Vector3d last_center = structure.last_from_reference.TargetOriginInSource();
   for (size_t i = 0; i < views.last.size(); ++i) {
-    if (motion.is_inlier[i] == 0) structure.costs[i] = 2 * kChi2TwoDof;
+    const Eigen::Vector3d& point = problem.points[i].position;
+    structure.points_in_reference.push_back(point);
+    const bool is_good = is_outlier[2 * i] == 0 && is_outlier[2 * i + 1] == 0 &&
+                         ParallaxAngle(point, point - last_center) > kMinParallaxRad;
+    structure.is_good.push_back(is_good);
+    structure.points += is_good;
   }
   return structure;
 }

@@ -35,6 +35,8 @@ struct InitialStructure {
   std::vector<double> costs;                         // per match: squared errors of all its sightings, in sigmas, each cut
                                                      // off at the outlier limit
   int points = 0;
+
+  double MeanCost() const;
 };
 
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views);

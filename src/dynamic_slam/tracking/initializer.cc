@@ -12,7 +12,7 @@ constexpr double kMatchRatio = 0.9;
 constexpr size_t kMaxViewsBetween = 6;
 
 // Standard errors by which the better of two motions must be better. Errors of one scene are not independent, so more
-// than the usual three.
+// than the usual three; and max_cost_ratio guards against what no such test sees, a rolling shutter that bends all.
 constexpr double kMinPreference = 5.0;
 
 }  // namespace
@@ -129,17 +129,17 @@ void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches)
 
 std::optional<InitialStructure> Initializer::ChooseStructure(const TwoViewResult& result) {
   InitialStructure best = RefineMotion(camera_, result.motion, views_);
-  double certainty = kMinPreference;
+  double cost_ratio = 0;
+  bool is_certain = true;
   for (const TwoViewMotion& rival : result.rivals) {
     InitialStructure other = RefineMotion(camera_, rival, views_);
-    const double preference = Preference(best, other);
-    if (getenv("DS_DEBUG")) { auto m=[](const InitialStructure& q){double t=0; for(double c:q.costs)t+=c; return t/q.costs.size();}; fmt::print(stderr,"rival pref {:.2f} mean cost {:.3f} {:.3f} points {} {} views {} matches {}\n", preference, m(best), m(other), best.points, other.points, views_.between.size()+2, views_.last.size()); }
-    if (preference < 0) std::swap(best, other);
-    certainty = std::min(certainty, std::abs(preference));
+    if (other.MeanCost() < best.MeanCost()) std::swap(best, other);
+    cost_ratio = std::max(cost_ratio, best.MeanCost() / other.MeanCost());
+    is_certain = is_certain && Preference(best, other) > kMinPreference;
   }
-  if (certainty < kMinPreference) {
-    reason_ = fmt::format("initialising: two motions fit {} views, certainty {:.1f} < {:.1f}; show something out of the plane",
-                          views_.between.size() + 2, certainty, kMinPreference);
+  if (!is_certain || cost_ratio > options_.max_cost_ratio) {
+    reason_ = fmt::format("initialising: two motions fit {} views, errors {:.2f} of each other > {:.2f}; "
+                          "show something out of the plane", views_.between.size() + 2, cost_ratio, options_.max_cost_ratio);
     return std::nullopt;
   }
   if (!best.usable || best.points < options_.two_view.min_points) {
@@ -147,7 +147,6 @@ std::optional<InitialStructure> Initializer::ChooseStructure(const TwoViewResult
                           options_.two_view.min_points);
     return std::nullopt;
   }
-    if (getenv("DS_DEBUG")) { auto m=[](const InitialStructure& q){double t=0; for(double c:q.costs)t+=c; return t/q.costs.size();}; fmt::print(stderr,"accept cost {:.3f} points {} views {} matches {} rivals {} parallax {:.2f}\n", m(best), best.points, views_.between.size()+2, views_.last.size(), result.rivals.size(), result.parallax_deg); }
   return best;
 }
 

@@ -26,7 +26,7 @@ KeyframeReason DecideKeyframe(const KeyframePolicyInput& input, const KeyframePo
   if (input.inliers < options.min_inliers || input.frames_since_keyframe < options.min_frames) {
     return KeyframeReason::kNone;
   }
-  if (input.inliers < options.max_tracked_ratio * input.reference_landmarks) return KeyframeReason::kNewView;
+  if (input.inliers < options.max_tracked_ratio * input.most_inliers) return KeyframeReason::kNewView;
   if (input.inliers < kFewInliers) return KeyframeReason::kFewInliers;
   if (input.frames_since_keyframe >= options.max_frames) return KeyframeReason::kTime;
   return KeyframeReason::kNone;

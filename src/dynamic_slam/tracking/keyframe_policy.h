@@ -6,13 +6,13 @@ namespace dynamic_slam {
 
 struct KeyframePolicyInput {
   int frames_since_keyframe = 0;
-  int inliers = 0;              // landmarks that the frame tracks
-  int reference_landmarks = 0;  // well-observed landmarks of its reference keyframe
+  int inliers = 0;       // landmarks that the frame tracks
+  int most_inliers = 0;  // the most that a frame since the last keyframe did
 };
 
 enum class KeyframeReason {
   kNone,         // no keyframe
-  kNewView,      // tracks too little of what the reference keyframe sees
+  kNewView,      // tracks too little of what was seen since the last keyframe
   kFewInliers,   // about to be lost
   kTime,         // long since the last one
 };

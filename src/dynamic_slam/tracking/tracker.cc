@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <utility>
-#include <cstdlib>
 
 namespace dynamic_slam {
 namespace {
@@ -12,6 +11,8 @@ constexpr double kWideSearch = 3.0;
 
 // A pose that comes from descriptors alone is less exact than a prediction.
 constexpr double kRelocalisedSearch = 3.0;
+
+constexpr int kLocalMapPasses = 2;
 
 }  // namespace
 
@@ -90,6 +91,7 @@ void Tracker::Initialise(TrackingResult* result) {
   initializer_.Reset();
   last_keyframe_ = frame_.reference;
   last_keyframe_frame_ = frame_.id;
+  most_inliers_ = 0;
   inliers_ = map_->keyframes().At(last_keyframe_).LandmarkCount();
   map_->keyframes().ForEach([result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
 }
@@ -123,10 +125,10 @@ bool Tracker::TrackFrame() {
 bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
   view_builder_.Build(*map_, frame_.landmarks, options_.local_keyframes, &view_);
   if (!view_.reference.IsValid()) return false;
-  inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px*(getenv("DS_W")?atof(getenv("DS_W")):1.0), &frame_, &in_view_);
-  if (getenv("DS_DEBUG")) { int v=0; for (auto x: in_view_) v+=x; fmt::print(stderr,"frame {} inl {} of view {} local {}\n", frame_.id.value(), inliers_, v, view_.size()); }
-  if (getenv("DS_PASS2")) inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px, &frame_, &in_view_);
-  if (getenv("DS_DEBUG")) { int v=0; for (auto x: in_view_) v+=x; fmt::print(stderr,"frame {} inl {} of view {} local {} again\n", frame_.id.value(), inliers_, v, view_.size()); }
+  // The second time from the better pose finds what the first one just missed.
+  for (int pass = 0; pass < kLocalMapPasses; ++pass) {
+    inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px, &frame_, &in_view_);
+  }
   if (inliers_ >= min_inliers) return true;
   reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
   return false;
@@ -165,20 +167,16 @@ void Tracker::CountVisibility() {
 }
 
 void Tracker::InsertKeyframeIfDue(TrackingResult* result) {
-  // While the map is young its landmarks have few observations.
-  const size_t well_observed = map_->keyframes().size() <= 2 ? 2 : 3;
+  most_inliers_ = std::max(most_inliers_, inliers_);
   KeyframePolicyInput input;
   input.frames_since_keyframe = static_cast<int>(frame_.id.value() - last_keyframe_frame_.value());
   input.inliers = inliers_;
-  for (const LandmarkId id : map_->keyframes().At(frame_.reference).landmarks()) {
-    if (id.IsValid() && map_->landmarks().At(id).observations().size() >= well_observed) ++input.reference_landmarks;
-  }
-  if (getenv("DS_PEAK")) { peak_ = std::max(peak_, inliers_); input.reference_landmarks = peak_; }
+  input.most_inliers = most_inliers_;
   result->keyframe_reason = DecideKeyframe(input, options_.keyframe);
   if (result->keyframe_reason == KeyframeReason::kNone) return;
   last_keyframe_ = InsertKeyframe(frame_, map_);
   last_keyframe_frame_ = frame_.id;
-  peak_ = 0;
+  most_inliers_ = 0;
   frame_.reference = last_keyframe_;
   frame_.cam_from_reference = Rigid3();
   result->new_keyframes.push_back(last_keyframe_);

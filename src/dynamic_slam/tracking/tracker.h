@@ -79,7 +79,7 @@ class Tracker {
   FrameId last_keyframe_frame_;
   int lost_frames_ = 0;
   int inliers_ = 0;
-  int peak_ = 0;
+  int most_inliers_ = 0;  // since the last keyframe
   std::string reason_;
   LocalView view_;
   std::vector<uint8_t> in_view_;

@@ -8,10 +8,11 @@
 namespace dynamic_slam {
 
 struct InitializerOptions {
-  double feature_factor = 2.0;
+  double feature_factor = 5.0;
   int min_matches = 100;
   double search_radius_px = 100;
   int max_octave = 3;
+  double max_cost_ratio = 0.75;
   TwoViewOptions two_view;
 
   template <class Self, class Visitor>
@@ -24,6 +25,8 @@ struct InitializerOptions {
           OptionField{"px", 5, 1000, "How far from its last place a keypoint is looked for."});
     visit("max_octave", self.max_octave,
           OptionField{"", 0, 11, "Coarser keypoints are too inaccurate to initialise with."});
+    visit("max_cost_ratio", self.max_cost_ratio,
+          OptionField{"", 0, 1, "Of two motions that fit, the errors of the better over those of the other, at most."});
     visit("two_view", self.two_view);
   }
 };
@@ -38,7 +41,7 @@ struct KeyframePolicyOptions {
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("max_tracked_ratio", self.max_tracked_ratio,
           OptionField{"", 0.1, 1,
-                      "A frame that tracks less than this part of its reference keyframe's landmarks shows new things."});
+                      "A frame that tracks less than this part of the most since the last keyframe shows new things."});
     visit("min_frames", self.min_frames, OptionField{"", 1, 1000, "Frames between two keyframes at least."});
     visit("max_frames", self.max_frames, OptionField{"", 1, 10000, "After so many frames a keyframe is due."});
     visit("min_inliers", self.min_inliers,
