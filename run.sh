@@ -14,9 +14,7 @@ fi
 "$root/scripts/build.sh" release dynamic_slam
 program="$root/build/release/apps/dynamic_slam"
 
-if [[ $# -eq 0 ]]; then
-  exec "$program" demo --out out/demo
-elif [[ "$1" == -* ]]; then
+if [[ $# -eq 0 || "$1" == -* ]]; then
   exec "$program" demo "$@"
 else
   exec "$program" run "$@"

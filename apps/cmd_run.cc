@@ -16,6 +16,7 @@
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
 #include "run_console.h"
+#include "truth_report.h"
 
 namespace dynamic_slam {
 namespace {
@@ -70,7 +71,9 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   summary.source = arguments.source;
   console.End();
   WriteResults(out, system, summary);
-  PrintSummary(summary, system, arguments.source, out);
+  PrintSummary(summary);
+  ReportTruth(arguments.source, system.FrameTrajectory(), out);
+  fmt::print("results: {}\n", out.string());
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
 

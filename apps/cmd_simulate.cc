@@ -1,18 +1,13 @@
 #include "cmd_simulate.h"
 
-#include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <fmt/core.h>
-#include <unistd.h>
 
-#include "dynamic_slam/base/error.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/sim/room.h"
-#include "dynamic_slam/sim/sequence_writer.h"
+#include "render_room.h"
 
 namespace dynamic_slam {
 namespace {
@@ -26,24 +21,8 @@ struct SimulateArguments {
 void RunSimulate(const SimulateArguments& arguments) {
   RoomOptions options = arguments.room;
   if (!arguments.camera.empty()) options.camera = LoadCamera(arguments.camera);
-  const std::filesystem::path folder = arguments.out;
-  if (!arguments.force && std::filesystem::exists(folder / "rgb.txt")) {
-    throw InputError(folder.string(), "holds a sequence already",
-                     "Give another --out, or --force to replace it.");
-  }
-  const Room room(options);
-  const bool terminal = isatty(fileno(stderr)) != 0;
-  WriteTumSequence(room, folder, [&](int frames) {
-    if (terminal) fmt::print(stderr, "\rrendered {} of {} frames", frames, options.frames);
-  });
-  if (terminal) fmt::print(stderr, "\n");
-  double path_m = 0;
-  const Trajectory& truth = room.truth();
-  for (size_t i = 1; i < truth.size(); ++i) {
-    path_m += (truth[i].world_from_cam.translation - truth[i - 1].world_from_cam.translation).norm();
-  }
-  fmt::print("{}: {} frames, path {:.2f} m, seed {}\n", folder.string(), options.frames, path_m,
-             options.seed);
+  if (!arguments.force) CheckHoldsNoSequence(arguments.out);
+  RenderRoom(Room(options), arguments.out);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "cmd_demo.h"
 #include "cmd_eval.h"
 #include "cmd_run.h"
 #include "cmd_simulate.h"
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
   dynamic_slam::AddRunCommand(app, &exit_code);
   dynamic_slam::AddEvalCommand(app);
   dynamic_slam::AddSimulateCommand(app);
+  dynamic_slam::AddDemoCommand(app, &exit_code);
   try {
     app.parse(argc, argv);  // runs the subcommand
     return exit_code;

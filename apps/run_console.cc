@@ -3,13 +3,8 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <optional>
 
 #include <fmt/core.h>
-
-#include "dynamic_slam/base/error.h"
-#include "dynamic_slam/eval/metrics.h"
-#include "dynamic_slam/io/trajectory_file.h"
 
 namespace dynamic_slam {
 namespace {
@@ -66,8 +61,7 @@ void RunConsole::End() {
   line_open_ = false;
 }
 
-void PrintSummary(const RunSummary& summary, const SlamSystem& system, const std::string& source,
-                  const std::filesystem::path& out) {
+void PrintSummary(const RunSummary& summary) {
   fmt::print("{} of {} frames have a pose ({:.1f}%), {} keyframes, {} landmarks\n", summary.frames_tracked,
              summary.frames_total, 100.0 * summary.Coverage(), summary.keyframes, summary.landmarks);
   if (summary.interrupted) fmt::print("interrupted: these are the results up to then\n");
@@ -79,20 +73,6 @@ void PrintSummary(const RunSummary& summary, const SlamSystem& system, const std
   for (const SourceProblem& problem : summary.skipped) fmt::print("skipped {}: {}\n", problem.name, problem.reason);
   fmt::print("tracking {:.1f} ms a frame (median), mapping {:.1f} ms a keyframe, {:.1f} s in all\n",
              summary.tracking_ms.median, summary.mapping_ms.median, summary.wall_s);
-  // Ground truth is a bonus here: without it, or without an overlap, the run is as good.
-  try {
-    const std::optional<Trajectory> truth = LoadGroundTruth(source);
-    const Trajectory trajectory = system.FrameTrajectory();
-    if (truth.has_value() && trajectory.size() >= 3) {
-      const MatchedPoses matched = MatchByTime(ToPoseList(*truth), ToPoseList(trajectory), 0.01);
-      const TrajectoryErrors errors = AbsolutePoseError(matched, Alignment::kSim3);
-      fmt::print("APE against the ground truth, after sim(3) alignment: rmse {:.4f} m, median {:.4f} m, {} poses\n",
-                 errors.translation_m.rmse, errors.translation_m.median, errors.translation_m.n);
-    }
-  } catch (const InputError& error) {
-    fmt::print("no APE: {}\n", error.what());
-  }
-  fmt::print("results: {}\n", out.string());
 }
 
 }  // namespace dynamic_slam

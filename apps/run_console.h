@@ -1,8 +1,6 @@
 #pragma once
 
 #include <chrono>
-#include <filesystem>
-#include <string>
 
 #include "dynamic_slam/system/sequence_runner.h"
 
@@ -33,8 +31,7 @@ class RunConsole {
   TrackingState last_state_ = TrackingState::kInitialising;
 };
 
-// What came out, where the files are, and how far it is from the ground truth that lies beside the source, if any.
-void PrintSummary(const RunSummary& summary, const SlamSystem& system, const std::string& source,
-                  const std::filesystem::path& out);
+// What came out.
+void PrintSummary(const RunSummary& summary);
 
 }  // namespace dynamic_slam
