@@ -1,0 +1,195 @@
+// The whole SLAM in a rendered room with exact truth.
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/base/text.h"
+#include "dynamic_slam/io/test_folder.h"
+#include "whole_run.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Room MakeRoom(int frames) {
+  RoomOptions options;
+  options.frames = frames;
+  return Room(options);
+}
+
+std::vector<cv::Mat> Frames(const Room& room, int begin, int end) {
+  std::vector<cv::Mat> frames;
+  for (int i = begin; i < end; ++i) frames.push_back(room.Frame(i));
+  return frames;
+}
+
+std::vector<cv::Mat> BlackFrames(int count) {
+  return std::vector<cv::Mat>(static_cast<size_t>(count), cv::Mat::zeros(480, 640, CV_8UC1));
+}
+
+std::vector<cv::Mat> Join(std::vector<cv::Mat> a, const std::vector<cv::Mat>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+int CountState(const RunSummary& summary, TrackingState state) {
+  return static_cast<int>(std::count_if(summary.frames.begin(), summary.frames.end(),
+                                        [state](const auto& f) { return f.state == state; }));
+}
+
+class SystemTest : public FolderTest {};
+
+TEST_F(SystemTest, FollowsTheCameraThroughARoom) {
+  const Room room = MakeRoom(150);
+  const WholeRun run = RunAll(*MakeRoomSource(room), room.options().camera);
+  const RunSummary& summary = run.summary;
+  ASSERT_TRUE(summary.initialised_at.has_value()) << summary.last_reason;
+  EXPECT_LE(*summary.initialised_at, 15u);
+  EXPECT_EQ(summary.frames_total, 150u);
+  EXPECT_GE(summary.Coverage(), 0.93);
+  EXPECT_EQ(summary.lost_count, 0);
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()), 0.005 * PathLength(room.truth()));
+  EXPECT_THAT(run.system->map().Validate(), IsEmpty());
+  EXPECT_EQ(run.system->KeyframeTrajectory().size(), summary.keyframes);
+  EXPECT_EQ(summary.frames.size(), 150u);
+}
+
+TEST_F(SystemTest, TwoRunsGiveTheSameBytes) {
+  const std::vector<cv::Mat> frames = Frames(MakeRoom(90), 0, 90);
+  for (const char* name : {"a", "b"}) {
+    const WholeRun run = RunImages(frames);
+    WriteResults(folder_ / name, *run.system, run.summary);
+  }
+  for (const char* name : {"trajectory.txt", "keyframes.txt", "map.ply", "config.yaml"}) {
+    const std::string first = ReadFile(folder_ / "a" / name);
+    EXPECT_GT(first.size(), 100u) << name;
+    EXPECT_TRUE(first == ReadFile(folder_ / "b" / name)) << name << " differs";
+  }
+}
+
+TEST_F(SystemTest, ACameraThatStandsStillNeverStarts) {
+  const Room room = MakeRoom(1);
+  const cv::Mat view = room.Render(room.truth()[0].world_from_cam);
+  Random random(1);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 20; ++i) {
+    frames.push_back(view.clone());
+    for (auto pixel = frames.back().begin<uint8_t>(); pixel != frames.back().end<uint8_t>(); ++pixel) {
+      *pixel = cv::saturate_cast<uint8_t>(*pixel + 1.5 * random.Gaussian());
+    }
+  }
+  const WholeRun run = RunImages(std::move(frames));
+  EXPECT_FALSE(run.summary.initialised_at.has_value());
+  EXPECT_EQ(run.summary.frames_tracked, 0u);
+  EXPECT_THAT(run.summary.last_reason, HasSubstr("parallax"));
+}
+
+TEST_F(SystemTest, BlackImagesGiveAReason) {
+  const WholeRun run = RunImages(BlackFrames(3));
+  EXPECT_EQ(run.summary.Coverage(), 0);
+  EXPECT_THAT(run.summary.last_reason, HasSubstr("0 keypoints"));
+  EXPECT_THAT(run.summary.last_reason, HasSubstr("texture"));
+  WriteResults(folder_, *run.system, run.summary);  // empty results are results
+  EXPECT_THAT(ReadFile(folder_ / "trajectory.txt"), testing::MatchesRegex("#[^\n]*\n"));
+}
+
+TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
+  const Room room = MakeRoom(125);
+  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), BlackFrames(5)), Frames(room, 85, 125)));
+  const RunSummary& summary = run.summary;
+  ASSERT_TRUE(summary.initialised_at.has_value());
+  EXPECT_EQ(summary.lost_count, 1);
+  EXPECT_EQ(summary.reset_count, 0) << "the map is kept";
+  for (size_t i = 80; i < 85; ++i) {
+    EXPECT_EQ(summary.frames[i].state, TrackingState::kLost);
+    EXPECT_THAT(summary.frames[i].reason, HasSubstr("lost"));
+  }
+  EXPECT_EQ(summary.frames[85].state, TrackingState::kTracking) << summary.frames[85].reason;
+  EXPECT_THAT(summary.frames[85].reason, HasSubstr("found again"));
+  EXPECT_EQ(summary.frames.back().state, TrackingState::kTracking);
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()), 0.005 * PathLength(room.truth()));
+  EXPECT_THAT(run.system->map().Validate(), IsEmpty());
+}
+
+TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {
+  const Room room = MakeRoom(60);
+  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 12), BlackFrames(20)), Frames(room, 30, 60)));
+  const RunSummary& summary = run.summary;
+  EXPECT_EQ(summary.reset_count, 1);
+  const auto reset = std::find_if(summary.frames.begin(), summary.frames.end(), [](const auto& frame) {
+    return frame.reason.starts_with("starting again");
+  });
+  ASSERT_NE(reset, summary.frames.end());
+  EXPECT_EQ(reset->state, TrackingState::kInitialising);
+  ASSERT_TRUE(summary.initialised_at.has_value());
+  EXPECT_GT(*summary.initialised_at, 32u) << "of the second map";
+  for (const StampedPose& pose : run.system->FrameTrajectory()) EXPECT_GT(pose.timestamp_s, 31.0 / 30);
+  EXPECT_THAT(run.system->map().Validate(), IsEmpty());
+}
+
+TEST_F(SystemTest, NothingIsSeenUnderTheMask) {
+  const Room room = MakeRoom(30);
+  cv::Mat mask = cv::Mat::zeros(480, 640, CV_8UC1);
+  mask(cv::Rect(320, 0, 320, 480)) = 255;
+  SlamSystem system(room.options().camera, {});
+  FrameResult result;
+  for (int i = 0; i < 30; ++i) result = system.Process(room.truth()[i].timestamp_s, room.Frame(i), mask);
+  EXPECT_EQ(result.tracking.state, TrackingState::kTracking) << result.tracking.reason;
+  system.map().keyframes().ForEach([](const Keyframe& keyframe) {
+    for (const Keypoint& keypoint : keyframe.features().keypoints) EXPECT_LT(keypoint.raw_x, 320);
+  });
+}
+
+TEST_F(SystemTest, AnInterruptedRunKeepsWhatItHas) {
+  const Room room = MakeRoom(200);
+  SlamSystem system(room.options().camera, {});
+  const RunSummary summary = RunSequence(*MakeRoomSource(room), system,
+                                         [](const RunProgress& progress) { return progress.frame < 30; });
+  EXPECT_TRUE(summary.interrupted);
+  EXPECT_EQ(summary.frames_total, 30u);
+  EXPECT_EQ(CountState(summary, TrackingState::kTracking) + 1, static_cast<int>(summary.frames_tracked));
+  EXPECT_GT(summary.Coverage(), 0.5);
+}
+
+TEST_F(SystemTest, AnImageOfTheWrongSizeIsABug) {
+  SlamSystem system(DefaultRoomCamera(), {});
+  EXPECT_THROW(system.Process(0, cv::Mat::zeros(480, 641, CV_8UC1)), InternalError);
+  EXPECT_THROW(system.Process(0, cv::Mat::zeros(480, 640, CV_8UC3)), InternalError);
+}
+
+TEST_F(SystemTest, OptionsAndCamerasOutOfRangeAreNamed) {
+  SystemOptions options;
+  options.tracker.min_inliers = 0;
+  options.orb.levels = 99;
+  const std::string error = ErrorOf([&] { SlamSystem system(DefaultRoomCamera(), options); });
+  EXPECT_THAT(error, HasSubstr("tracker.min_inliers"));
+  EXPECT_THAT(error, HasSubstr("orb.levels"));
+  Camera camera = DefaultRoomCamera();
+  camera.fx = 0;
+  EXPECT_THAT(ErrorOf([&] { SlamSystem system(camera, {}); }), HasSubstr("fx"));
+}
+
+TEST(SummariseTimesTest, KnownAnswers) {
+  EXPECT_EQ(SummariseTimes({}).max, 0);
+  const TimeStatistics odd = SummariseTimes({3, 1, 8});
+  EXPECT_EQ(odd.median, 3);
+  EXPECT_EQ(odd.mean, 4);
+  EXPECT_EQ(odd.p95, 8);
+  EXPECT_EQ(odd.max, 8);
+  std::vector<double> hundred;
+  for (int i = 100; i > 0; --i) hundred.push_back(i);
+  const TimeStatistics even = SummariseTimes(hundred);
+  EXPECT_EQ(even.median, 50.5);
+  EXPECT_EQ(even.p95, 96);
+}
+
+}  // namespace
+}  // namespace dynamic_slam
