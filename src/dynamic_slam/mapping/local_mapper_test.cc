@@ -1,0 +1,214 @@
+#include "dynamic_slam/mapping/local_mapper.h"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/map/synthetic_world.h"
+#include "dynamic_slam/mapping/landmark_factory.h"
+#include "dynamic_slam/mapping/landmark_fusion.h"
+#include "dynamic_slam/mapping/map_bundle.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::IsEmpty;
+
+constexpr uint32_t kPoints = 800;
+
+// Two keyframes that share the landmarks of a quarter of the points.
+struct TwoKeyframes {
+  explicit TwoKeyframes(double baseline) {
+    first = scene.Add(Rigid3());
+    second = scene.Add(SidewaysPose(baseline));
+    scene.AddLandmarks(0, kPoints / 4, {first, second});
+  }
+  int CountShared() const {
+    const auto &a = scene.views[0].points, &b = scene.views[1].points;  // both in ascending order
+    std::vector<uint32_t> both;
+    std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(both));
+    return static_cast<int>(both.size());
+  }
+  SyntheticWorld world{kPoints};
+  SyntheticMap scene{&world};
+  KeyframeId first, second;
+};
+
+TEST(LandmarkFactoryTest, NewLandmarksAreNearTheTruth) {
+  TwoKeyframes two(0.5);
+  Map& map = two.scene.map;
+  const int possible = two.CountShared() - static_cast<int>(map.landmarks().size());
+  const std::vector<LandmarkId> created = LandmarkFactory(two.world.camera(), {}).Create(two.second, &map);
+  EXPECT_GT(static_cast<int>(created.size()), 0.85 * possible);
+  std::vector<double> errors;
+  int wrong = 0;
+  for (const LandmarkId id : created) {
+    const Landmark& landmark = map.landmarks().At(id);
+    ASSERT_EQ(landmark.observations().size(), 2u);
+    const uint32_t point = two.scene.PointOf(landmark.observations()[0]);
+    wrong += point != two.scene.PointOf(landmark.observations()[1]);
+    errors.push_back((landmark.position() - two.world.position(point)).norm() / landmark.position().z());
+    EXPECT_GT(landmark.max_distance(), 0) << "not refreshed";
+  }
+  EXPECT_LE(wrong, 2);
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.02);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.08);
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(LandmarkFactoryTest, WithoutParallaxThereAreNone) {
+  TwoKeyframes two(0.07);  // 0.6 to 1.4 deg
+  MapperOptions options;
+  options.min_parallax_deg = 2;
+  EXPECT_THAT(LandmarkFactory(two.world.camera(), options).Create(two.second, &two.scene.map), IsEmpty());
+  options.min_parallax_deg = 0.1;
+  EXPECT_GT(LandmarkFactory(two.world.camera(), options).Create(two.second, &two.scene.map).size(), 100u)
+      << "it was the parallax";
+}
+
+TEST(LandmarkFactoryTest, NeighboursAtTheSamePlaceAreLeftOut) {
+  TwoKeyframes two(0.03);
+  MapperOptions options;
+  options.min_parallax_deg = 0;
+  EXPECT_THAT(LandmarkFactory(two.world.camera(), options).Create(two.second, &two.scene.map), IsEmpty());
+}
+
+TEST(LandmarkFactoryTest, NothingIsMadeBehindTheCamera) {
+  TwoKeyframes two(0.5);
+  // As if the camera had gone the other way: all rays meet behind it.
+  two.scene.map.keyframes().At(two.second).set_cam_from_world(SidewaysPose(-0.5));
+  EXPECT_LE(LandmarkFactory(two.world.camera(), {}).Create(two.second, &two.scene.map).size(), 2u);
+}
+
+TEST(LandmarkFusionTest, DuplicatesBecomeOne) {
+  SyntheticWorld world(300);
+  SyntheticMap scene(&world);
+  std::vector<KeyframeId> ids;
+  for (int i = 0; i < 4; ++i) ids.push_back(scene.Add(SidewaysPose(0.1 * i)));
+  scene.AddLandmarks(0, 150, {ids[0], ids[1]});
+  scene.AddLandmarks(0, 150, {ids[2], ids[3]});  // the same points once more
+  scene.AddLandmarks(150, 300, ids);
+  const size_t before = scene.map.landmarks().size();
+
+  const FusionCount count = FuseLandmarks(world.camera(), {}, ids[3], &scene.map);
+  EXPECT_EQ(scene.map.landmarks().size(), before - static_cast<size_t>(count.merged));
+  EXPECT_THAT(scene.map.Validate(), IsEmpty());
+  std::vector<int> landmarks_of(world.size(), 0);
+  scene.map.landmarks().ForEach([&](const Landmark& landmark) {
+    const uint32_t point = scene.PointOf(landmark.observations()[0]);
+    ++landmarks_of[point];
+    for (const Observation& other : landmark.observations()) EXPECT_EQ(scene.PointOf(other), point);
+  });
+  // Some twins lie beyond the error limit of a noisy keypoint.
+  const auto twice = std::count(landmarks_of.begin(), landmarks_of.end(), 2);
+  EXPECT_LE(twice, 5);
+  EXPECT_GT(count.merged, 50);
+}
+
+TEST(LandmarkFusionTest, UnknownSightingsAreLinked) {
+  SyntheticWorld world(200);
+  SyntheticMap scene(&world);
+  std::vector<KeyframeId> ids;
+  for (int i = 0; i < 3; ++i) ids.push_back(scene.Add(SidewaysPose(0.1 * i)));
+  scene.AddLandmarks(0, 20, ids);
+  const int unknown_to_third = scene.AddLandmarks(20, 200, {ids[0], ids[1]});
+  const FusionCount count = FuseLandmarks(world.camera(), {}, ids[2], &scene.map);
+  EXPECT_EQ(count.merged, 0);
+  EXPECT_GT(count.linked, 0.85 * unknown_to_third);
+  EXPECT_THAT(scene.map.Validate(), IsEmpty());
+}
+
+TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
+  SyntheticWorld world(400, 0.01);
+  SyntheticMap scene(&world);
+  std::vector<KeyframeId> ids;
+  for (int i = 0; i < 5; ++i) ids.push_back(scene.Add(SidewaysPose(0.2 * i)));
+  scene.AddLandmarks(0, 399, ids);
+  // A keypoint that is none of this landmark.
+  const auto& points = scene.views[2].points;
+  const uint32_t free = static_cast<uint32_t>(
+      std::find_if(points.begin(), points.end(),
+                   [&](const uint32_t& point) {
+                     return !scene.map.keyframes()
+                                 .At(ids[2])
+                                 .landmarks()[static_cast<size_t>(&point - points.data())]
+                                 .IsValid();
+                   }) -
+      points.begin());
+  ASSERT_LT(free, points.size());
+  const LandmarkId misled = [&] {
+    LandmarkId found;
+    scene.map.landmarks().ForEach([&](const Landmark& landmark) {
+      if (!landmark.IsSeenBy(ids[2]) && landmark.observations().size() >= 2) found = landmark.id();
+    });
+    return found;
+  }();
+  ASSERT_TRUE(misled.IsValid());
+  scene.map.Link(ids[2], free, misled);
+
+  Random random(8);
+  for (size_t i = 2; i < ids.size(); ++i) {
+    Rigid3 pose = scene.map.keyframes().At(ids[i]).cam_from_world();
+    pose.translation += 0.02 * Eigen::Vector3d(random.Gaussian(), random.Gaussian(), random.Gaussian());
+    scene.map.keyframes().At(ids[i]).set_cam_from_world(pose);
+  }
+  const BundleSummary summary = AdjustAll(world.camera(), {}, {}, &scene.map);
+  EXPECT_TRUE(summary.usable);
+  EXPECT_FALSE(scene.map.keyframes().At(ids[2]).landmarks()[free].IsValid());
+  // The scale is free: compare the shape of the path.
+  const double unit = scene.map.keyframes().At(ids[1]).CenterInWorld().x() / 0.2;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    const Eigen::Vector3d center = scene.map.keyframes().At(ids[i]).CenterInWorld() / unit;
+    EXPECT_LT((center - Eigen::Vector3d(0.2 * static_cast<double>(i), 0, 0)).norm(), 0.003) << i;
+  }
+  EXPECT_THAT(scene.map.Validate(), IsEmpty());
+}
+
+TEST(LocalMapperTest, ARedundantKeyframeGoesAndItsFramesStay) {
+  SyntheticWorld world(400);
+  SyntheticMap scene(&world);
+  LocalMapper mapper(world.camera(), {}, &scene.map);
+  std::vector<KeyframeId> ids;
+  for (int i = 0; i < 6; ++i) ids.push_back(scene.Add(SidewaysPose(0.05 * i)));
+  scene.AddLandmarks(0, 400, ids);
+  const MappingResult result = mapper.Process(ids.back());
+  EXPECT_GE(result.culled_keyframes, 1);
+  EXPECT_EQ(scene.map.keyframes().size(), ids.size() - static_cast<size_t>(result.culled_keyframes));
+  EXPECT_TRUE(scene.map.keyframes().Contains(ids.front())) << "the origin stays";
+  EXPECT_TRUE(scene.map.keyframes().Contains(ids.back())) << "the new one stays";
+  for (size_t i = 0; i < ids.size(); ++i) {
+    const Rigid3 pose = scene.map.PoseFromReference(ids[i], Rigid3());
+    EXPECT_LT((pose.translation - scene.views[i].frame.cam_from_world.translation).norm(), 0.01) << i;
+  }
+  EXPECT_THAT(scene.map.Validate(), IsEmpty());
+}
+
+TEST(LocalMapperTest, ALandmarkThatTrackingDoesNotFindIsCulled) {
+  TwoKeyframes two(0.4);
+  Map& map = two.scene.map;
+  LocalMapper mapper(two.world.camera(), {}, &map);
+  const MappingResult first = mapper.Process(two.second);
+  ASSERT_GT(first.created, 100);
+  LandmarkId unfound, unseen;
+  map.landmarks().ForEach([&](const Landmark& landmark) {
+    if (landmark.created_by() == two.second && landmark.observations().size() == 2) {
+      unfound = unseen;
+      unseen = landmark.id();
+    }
+  });
+  ASSERT_TRUE(unfound.IsValid() && unseen.IsValid());
+  map.landmarks().At(unfound).visible_count = 1000;
+  // Far away, so that nobody sees the other one again.
+  const Rigid3 elsewhere(ExpSo3({0, 0.9, 0}), {0, 0, 0});
+  mapper.Process(two.scene.Add(elsewhere));
+  EXPECT_FALSE(map.landmarks().Contains(unfound));
+  EXPECT_TRUE(map.landmarks().Contains(unseen)) << "still on probation";
+  mapper.Process(two.scene.Add(elsewhere));
+  EXPECT_FALSE(map.landmarks().Contains(unseen));
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace dynamic_slam

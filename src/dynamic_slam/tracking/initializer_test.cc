@@ -1,0 +1,81 @@
+#include "dynamic_slam/tracking/initializer.h"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/map/synthetic_world.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class InitializerTest : public ::testing::Test {
+ protected:
+  bool Try(const Rigid3& cam_from_world) {
+    views_.push_back(world_.See(cam_from_world));
+    return initializer_.TryFrame(&views_.back().frame, random_, &map_);
+  }
+
+  SyntheticWorld world_{1500, 0.1};
+  Initializer initializer_{world_.camera(), {}, SyntheticWorld::OctaveScales()};
+  Random random_{1};
+  Map map_{SyntheticWorld::OctaveScales()};
+  std::vector<SyntheticView> views_;
+};
+
+TEST_F(InitializerTest, MakesAMapThatIsTrueUpToScale) {
+  EXPECT_FALSE(Try(SidewaysPose(0)));
+  EXPECT_THAT(initializer_.reason(), HasSubstr("second view"));
+  double x = 0;
+  while (x < 0.6 && !Try(SidewaysPose(x += 0.05))) {
+  }
+  ASSERT_EQ(map_.keyframes().size(), 2u) << initializer_.reason();
+  EXPECT_THAT(map_.Validate(), IsEmpty());
+  EXPECT_NEAR(map_.MedianDepth(KeyframeId(0)), 1, 1e-9);
+  EXPECT_GT(map_.landmarks().size(), 200u);
+
+  const Frame& frame = views_.back().frame;
+  EXPECT_EQ(frame.reference, KeyframeId(1));
+  EXPECT_EQ(frame.cam_from_world.translation,
+            map_.keyframes().At(KeyframeId(1)).cam_from_world().translation);
+  const double m_per_unit = x / map_.keyframes().At(KeyframeId(1)).CenterInWorld().norm();
+  EXPECT_LT((m_per_unit * frame.cam_from_world.translation - Eigen::Vector3d(-x, 0, 0)).norm(), 0.05 * x);
+  EXPECT_LT(RotationAngle(frame.cam_from_world.rotation, Eigen::Quaterniond::Identity()), 0.005);
+  std::vector<double> errors;
+  map_.landmarks().ForEach([&](const Landmark& landmark) {
+    const Eigen::Vector3d& truth =
+        world_.position(views_.front().points[landmark.observations()[0].keypoint]);
+    errors.push_back((m_per_unit * landmark.position() - truth).norm() / truth.z());
+  });
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.03);
+}
+
+TEST_F(InitializerTest, ACameraThatTurnsOnlyWaits) {
+  for (int i = 0; i < 12; ++i) EXPECT_FALSE(Try(Rigid3(ExpSo3({0, 0.01 * i, 0}), {0, 0, 0})));
+  EXPECT_THAT(initializer_.reason(), HasSubstr("parallax"));
+  EXPECT_EQ(map_.keyframes().size(), 0u);
+  EXPECT_EQ(map_.landmarks().size(), 0u);
+}
+
+TEST_F(InitializerTest, StartsAgainWhenTheFirstViewIsOutOfSight) {
+  EXPECT_FALSE(Try(SidewaysPose(0)));
+  EXPECT_FALSE(Try(Rigid3(ExpSo3({0, 0.7, 0}), {0, 0, 0})));
+  EXPECT_THAT(initializer_.reason(), HasSubstr("starting again from this one"));
+}
+
+TEST_F(InitializerTest, TooFewKeypointsAreNoFirstView) {
+  SyntheticWorld poor(60);
+  SyntheticView view = poor.See(Rigid3());
+  EXPECT_FALSE(initializer_.TryFrame(&view.frame, random_, &map_));
+  EXPECT_THAT(initializer_.reason(), HasSubstr(std::to_string(view.points.size()) + " keypoints < 100"));
+  EXPECT_FALSE(Try(SidewaysPose(0)));
+  EXPECT_THAT(initializer_.reason(), HasSubstr("second view")) << "the poor view is not kept";
+}
+
+}  // namespace
+}  // namespace dynamic_slam
