@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -27,9 +28,9 @@ struct DemoArguments {
   bool force = false;
 };
 
-void DrawRun(const Room& room, const SlamSystem& system, const std::filesystem::path& out) {
+void DrawRun(const Room& room, const SlamSystem& system, const TruthComparison& comparison,
+             const std::filesystem::path& out) {
   const Trajectory estimate = system.FrameTrajectory();
-  const TruthComparison comparison = CompareWithTruth(room.truth(), estimate);
   const std::string title =
       fmt::format("Dynamic-SLAM in a rendered room: {} of {} frames have a pose, APE {}", estimate.size(),
                   room.options().frames, DescribeApe(comparison));
@@ -55,9 +56,8 @@ void RunDemo(const DemoArguments& arguments, int* exit_code) {
   console.End();
   WriteResults(out, system, summary);
   PrintSummary(summary);
-  ReportTruth(sequence, system.FrameTrajectory(), out);
-  // A few poses of the start allow no alignment.
-  if (system.map().keyframes().size() >= 3) DrawRun(room, system, out);
+  const std::optional<TruthComparison> comparison = ReportTruth(sequence, system.FrameTrajectory(), out);
+  if (comparison.has_value()) DrawRun(room, system, *comparison, out);
   fmt::print("results: {}\nimages:  {}\n", out.string(), sequence.string());
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }

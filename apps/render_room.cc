@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/eval/pose_list.h"
 #include "dynamic_slam/sim/sequence_writer.h"
 
 namespace dynamic_slam {
@@ -20,13 +21,8 @@ void RenderRoom(const Room& room, const std::filesystem::path& folder) {
     if (terminal) fmt::print(stderr, "\rrendered {} of {} frames", frames, room.options().frames);
   });
   if (terminal) fmt::print(stderr, "\n");
-  double path_m = 0;
-  const Trajectory& truth = room.truth();
-  for (size_t i = 1; i < truth.size(); ++i) {
-    path_m += (truth[i].world_from_cam.translation - truth[i - 1].world_from_cam.translation).norm();
-  }
-  fmt::print("{}: {} frames, path {:.2f} m, seed {}\n", folder.string(), truth.size(), path_m,
-             room.options().seed);
+  fmt::print("{}: {} frames, path {:.2f} m, seed {}\n", folder.string(), room.truth().size(),
+             PathLength(ToPoseList(room.truth())), room.options().seed);
 }
 
 }  // namespace dynamic_slam

@@ -19,9 +19,7 @@ TruthComparison CompareWithTruth(const Trajectory& truth, const Trajectory& esti
   TruthComparison comparison;
   const MatchedPoses matched = MatchByTime(ToPoseList(truth), ToPoseList(estimate), kMaxDifferenceS);
   comparison.ape = AbsolutePoseError(matched, Alignment::kSim3);
-  for (size_t i = 1; i < matched.reference.size(); ++i) {
-    comparison.path_m += (matched.reference[i].position - matched.reference[i - 1].position).norm();
-  }
+  comparison.path_m = PathLength(matched.reference);
   std::copy_if(truth.begin(), truth.end(), std::back_inserter(comparison.truth),
                [&estimate](const StampedPose& pose) {
                  return pose.timestamp_s >= estimate.front().timestamp_s - kMaxDifferenceS &&
@@ -52,19 +50,21 @@ TrajectoryPlot PlotOverTruth(const TruthComparison& comparison, const Trajectory
   return plot;
 }
 
-void ReportTruth(const std::filesystem::path& source, const Trajectory& estimate,
-                 const std::filesystem::path& out) {
+std::optional<TruthComparison> ReportTruth(const std::filesystem::path& source, const Trajectory& estimate,
+                                           const std::filesystem::path& out) {
   // Ground truth is a bonus: with a broken one, or without an overlap, the run is as good.
   try {
     const std::optional<Trajectory> truth = LoadGroundTruth(source);
-    if (!truth.has_value() || estimate.empty()) return;
+    if (!truth.has_value() || estimate.empty()) return std::nullopt;
     const TruthComparison comparison = CompareWithTruth(*truth, estimate);
     fmt::print("APE against the ground truth, after sim(3) alignment: {}\n", DescribeApe(comparison));
     TrajectoryPlot plot = PlotOverTruth(comparison, estimate);
     plot.title = fmt::format("{}: APE {}", out.filename().string(), DescribeApe(comparison));
     WritePicture((out / "trajectory.png").string(), DrawPlot(plot, kPictureWidthPx, kPictureHeightPx));
+    return comparison;
   } catch (const InputError& error) {
     fmt::print("no APE: {}\n", error.what());
+    return std::nullopt;
   }
 }
 

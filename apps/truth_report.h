@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "dynamic_slam/eval/metrics.h"
 #include "dynamic_slam/eval/trajectory_plot.h"
@@ -26,8 +27,9 @@ std::string DescribeApe(const TruthComparison& comparison);
 TrajectoryPlot PlotOverTruth(const TruthComparison& comparison, const Trajectory& estimate);
 
 // Looks for ground truth beside the source. Where there is some, prints the error and draws trajectory.png
-// into `out`; where there is none, says nothing.
-void ReportTruth(const std::filesystem::path& source, const Trajectory& estimate,
-                 const std::filesystem::path& out);
+// into `out`. Nothing where there is none; also nothing, with the reason on the terminal, where it does not
+// fit.
+std::optional<TruthComparison> ReportTruth(const std::filesystem::path& source, const Trajectory& estimate,
+                                           const std::filesystem::path& out);
 
 }  // namespace dynamic_slam

@@ -56,7 +56,8 @@ TEST_F(SystemTest, FollowsTheCameraThroughARoom) {
   EXPECT_EQ(summary.frames_total, 150u);
   EXPECT_GE(summary.Coverage(), 0.93);
   EXPECT_EQ(summary.lost_count, 0);
-  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()), 0.005 * PathLength(room.truth()));
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
+            0.005 * PathLength(ToPoseList(room.truth())));
   EXPECT_THAT(run.system->map().Validate(), IsEmpty());
   EXPECT_EQ(run.system->KeyframeTrajectory().size(), summary.keyframes);
   EXPECT_EQ(summary.frames.size(), 150u);
@@ -115,7 +116,8 @@ TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
   EXPECT_EQ(summary.frames[85].state, TrackingState::kTracking) << summary.frames[85].reason;
   EXPECT_THAT(summary.frames[85].reason, HasSubstr("found again"));
   EXPECT_EQ(summary.frames.back().state, TrackingState::kTracking);
-  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()), 0.005 * PathLength(room.truth()));
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
+            0.005 * PathLength(ToPoseList(room.truth())));
   EXPECT_THAT(run.system->map().Validate(), IsEmpty());
 }
 

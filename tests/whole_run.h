@@ -58,13 +58,4 @@ inline double ApeRmse(const Trajectory& truth, const Trajectory& estimate) {
       .translation_m.rmse;
 }
 
-inline double PathLength(const Trajectory& trajectory) {
-  double length_m = 0;
-  for (size_t i = 1; i < trajectory.size(); ++i) {
-    length_m +=
-        (trajectory[i].world_from_cam.translation - trajectory[i - 1].world_from_cam.translation).norm();
-  }
-  return length_m;
-}
-
 }  // namespace dynamic_slam

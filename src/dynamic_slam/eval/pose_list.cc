@@ -13,6 +13,12 @@ PoseList ToPoseList(const Trajectory& trajectory) {
   return poses;
 }
 
+double PathLength(const PoseList& poses) {
+  double length_m = 0;
+  for (size_t i = 1; i < poses.size(); ++i) length_m += (poses[i].position - poses[i - 1].position).norm();
+  return length_m;
+}
+
 PoseList ToPoseList(std::span<const Eigen::Matrix<double, 3, 4>> world_from_cam,
                     std::span<const double> times_s) {
   if (!times_s.empty() && times_s.size() != world_from_cam.size()) {

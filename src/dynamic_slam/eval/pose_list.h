@@ -21,6 +21,9 @@ using PoseList = std::vector<EvalPose>;
 
 PoseList ToPoseList(const Trajectory& trajectory);
 
+// m, from position to position.
+double PathLength(const PoseList& poses);
+
 // From the upper 3x4 parts of world_from_cam, as KITTI's files have them. `times_s` holds a stamp for each;
 // when it is empty, the stamps are the row numbers. Throws InputError when there are more or fewer stamps
 // than poses.

@@ -17,6 +17,14 @@ TEST(ToPoseList, KeepsStampsAndPoses) {
   EXPECT_EQ(poses[0].position, Eigen::Vector3d(1, 2, 3));
 }
 
+TEST(PathLength, SumsTheSteps) {
+  PoseList poses(3);
+  EXPECT_EQ(PathLength({}), 0);
+  poses[1].position = {3, 4, 0};
+  poses[2].position = {3, 4, 2};
+  EXPECT_DOUBLE_EQ(PathLength(poses), 7);
+}
+
 TEST(ToPoseList, KeepsTheRoundedRotationsOfKitti) {
   std::vector<Eigen::Matrix<double, 3, 4>> matrices(2, Eigen::Matrix<double, 3, 4>::Identity());
   matrices[1] << 0.9999, 0, 0, 4, 0, 1.0001, 0, 5, 0, 0, 1, 6;
