@@ -29,7 +29,6 @@ MappingResult LocalMapper::Process(KeyframeId keyframe) {
   result.merged_landmarks = FuseLandmarks(camera_, options_, keyframe, map_).merged;
   if (map_->keyframes().size() >= 2) result.bundle = AdjustLocal(camera_, options_, keyframe, {}, map_);
   result.culled_keyframes = CullRedundantKeyframes(keyframe);
-  if (getenv("DS_DEBUG")) fmt::print(stderr, "kf {} frame {} lm {} culled {} created {} merged {} outliers {} of cost {:.0f}->{:.0f} it {} kfculled {} depth {:.2f}\n", keyframe.value(), map_->keyframes().At(keyframe).frame_id().value(), map_->keyframes().At(keyframe).LandmarkCount(), result.culled_landmarks, result.created, result.merged_landmarks, result.bundle.outliers, result.bundle.initial_cost, result.bundle.final_cost, result.bundle.iterations, result.culled_keyframes, map_->MedianDepth(keyframe));
   return result;
 }
 

@@ -6,11 +6,11 @@
 namespace dynamic_slam {
 
 struct MapperOptions {
-  int triangulation_neighbours = 20;
+  int triangulation_neighbours = 10;
   double min_baseline_ratio = 0.01;
   double min_parallax_deg = 1.0;
-  int fusion_neighbours = 20;
-  int local_keyframes = 20;
+  int fusion_neighbours = 10;
+  int local_keyframes = 30;
   int fixed_keyframes = 40;
   double redundant_ratio = 0.9;
   BundleOptions local_bundle;
