@@ -17,7 +17,7 @@ namespace dynamic_slam {
 struct TwoViewOptions {
   double sigma_px = 1.0;
   int min_points = 50;
-  double min_parallax_deg = 1.0;
+  double min_parallax_deg = 0.6;
   double min_point_parallax_deg = 0.3;
   double max_homography_score_ratio = 0.45;
   double max_second_best_ratio = 0.75;

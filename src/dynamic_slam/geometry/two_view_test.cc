@@ -196,7 +196,9 @@ TEST(TwoView, RefusalsSayWhyWithNumbers) {
 
   const Rigid3 small(kSideways.rotation, 0.1 * kSideways.translation);
   set = MakeMatches(camera, small, 300, 0.3, random, UniformDepth);
-  result = EstimateTwoView(camera, set.first_px, set.second_px, {}, random);
+  TwoViewOptions options;
+  options.min_parallax_deg = 1.0;
+  result = EstimateTwoView(camera, set.first_px, set.second_px, options, random);
   EXPECT_EQ(result.failure, TwoViewFailure::kLowParallax);
   EXPECT_GT(result.value, 0.2);
   EXPECT_LT(result.value, 1.0);

@@ -8,7 +8,7 @@ namespace dynamic_slam {
 struct MapperOptions {
   int triangulation_neighbours = 10;
   double min_baseline_ratio = 0.01;
-  double min_parallax_deg = 1.0;
+  double min_parallax_deg = 1.75;
   int fusion_neighbours = 10;
   int local_keyframes = 30;
   int fixed_keyframes = 40;
@@ -23,7 +23,7 @@ struct MapperOptions {
     visit("min_baseline_ratio", self.min_baseline_ratio,
           OptionField{"", 0, 1, "Distance to such a neighbour over the median depth of the scene, at least."});
     visit("min_parallax_deg", self.min_parallax_deg,
-          OptionField{"deg", 0, 45, "Parallax that a new landmark needs."});
+          OptionField{"deg", 0, 45, "Parallax that a new landmark needs; with less its depth is biased, and the scale drifts."});
     visit("fusion_neighbours", self.fusion_neighbours,
           OptionField{"", 1, 200, "Neighbours with which duplicate landmarks are fused."});
     visit("local_keyframes", self.local_keyframes,

@@ -128,6 +128,10 @@ void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches)
 }
 
 std::optional<InitialStructure> Initializer::ChooseStructure(const TwoViewResult& result) {
+  if (views_.between.empty()) {
+    reason_ = "initialising: waiting for a third view, to be sure";
+    return std::nullopt;
+  }
   InitialStructure best = RefineMotion(camera_, result.motion, views_);
   double cost_ratio = 0;
   bool is_certain = true;
