@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 namespace dynamic_slam {
 namespace {
@@ -14,6 +15,9 @@ constexpr size_t kMaxViewsBetween = 6;
 // Standard errors by which the better of two motions must be better. Errors of one scene are not independent, so more
 // than the usual three; and max_cost_ratio guards against what no such test sees, a rolling shutter that bends all.
 constexpr double kMinPreference = 5.0;
+
+// The same, when the errors of the two are too alike to be certain. Above what a rolling shutter was seen to do.
+constexpr double kMinTryPreference = 8.0;
 
 }  // namespace
 
@@ -76,25 +80,25 @@ std::vector<Match> Initializer::MatchWithReference(const Frame& frame) {
   return matches;
 }
 
-bool Initializer::TryFrame(Frame* frame, Random& random, Map* map) {
+std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& random) {
   if (!reference_.has_value()) {
-    if (static_cast<int>(frame->features.size()) < options_.min_matches) {
+    if (static_cast<int>(frame.features.size()) < options_.min_matches) {
       reason_ = fmt::format("initialising: {} keypoints < {}; point the camera at something with texture",
-                            frame->features.size(), options_.min_matches);
+                            frame.features.size(), options_.min_matches);
     } else {
-      StartFrom(*frame);
+      StartFrom(frame);
       reason_ = "initialising: waiting for a second view";
     }
-    return false;
+    return std::nullopt;
   }
-  const std::vector<Match> matches = MatchWithReference(*frame);
+  std::vector<Match> matches = MatchWithReference(frame);
   if (static_cast<int>(matches.size()) < options_.min_matches) {
     reason_ = fmt::format("initialising: {} matches < {} with the first view; starting again from this one",
                           matches.size(), options_.min_matches);
-    StartFrom(*frame);
-    return false;
+    StartFrom(frame);
+    return std::nullopt;
   }
-  AddView(*frame, matches);
+  AddView(frame, matches);
   std::vector<Eigen::Vector2d> first_px, second_px;
   for (const Sighting& sighting : views_.last) {
     first_px.push_back(views_.reference[sighting.reference_keypoint].ideal_px);
@@ -103,14 +107,15 @@ bool Initializer::TryFrame(Frame* frame, Random& random, Map* map) {
   const TwoViewResult motion = EstimateTwoView(camera_, first_px, second_px, options_.two_view, random);
   if (!motion.Succeeded() && motion.failure != TwoViewFailure::kAmbiguous) {
     reason_ = "initialising: " + Explain(motion);
-    return false;
+    return std::nullopt;
   }
-  const std::optional<InitialStructure> structure = ChooseStructure(motion);
-  if (!structure.has_value()) return false;
-  reason_ = fmt::format("initialised: {} points, parallax {:.1f} deg, {} views", structure->points,
+  std::optional<InitialProposal> proposal = ChooseStructure(motion);
+  if (!proposal.has_value()) return std::nullopt;
+  reason_ = fmt::format("initialised{}: {} points, parallax {:.1f} deg, {} views",
+                        proposal->is_certain ? "" : " for the time being", proposal->structure.points,
                         motion.parallax_deg, views_.between.size() + 2);
-  BuildMap(*structure, matches, frame, map);
-  return true;
+  proposal->matches = std::move(matches);
+  return proposal;
 }
 
 void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches) {
@@ -127,21 +132,21 @@ void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches)
   }
 }
 
-std::optional<InitialStructure> Initializer::ChooseStructure(const TwoViewResult& result) {
+std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult& result) {
   if (views_.between.empty()) {
     reason_ = "initialising: waiting for a third view, to be sure";
     return std::nullopt;
   }
   InitialStructure best = RefineMotion(camera_, result.motion, views_);
-  double cost_ratio = 0;
-  bool is_certain = true;
+  double cost_ratio = 0, preference = std::numeric_limits<double>::max();
   for (const TwoViewMotion& rival : result.rivals) {
     InitialStructure other = RefineMotion(camera_, rival, views_);
     if (other.MeanCost() < best.MeanCost()) std::swap(best, other);
     cost_ratio = std::max(cost_ratio, best.MeanCost() / other.MeanCost());
-    is_certain = is_certain && Preference(best, other) > kMinPreference;
+    preference = std::min(preference, Preference(best, other));
   }
-  if (!is_certain || cost_ratio > options_.max_cost_ratio) {
+  const bool is_certain = preference > kMinPreference && cost_ratio < options_.max_cost_ratio;
+  if (!is_certain && preference < kMinTryPreference) {
     reason_ = fmt::format("initialising: two motions fit {} views, errors {:.2f} of each other > {:.2f}; "
                           "show something out of the plane", views_.between.size() + 2, cost_ratio, options_.max_cost_ratio);
     return std::nullopt;
@@ -151,11 +156,12 @@ std::optional<InitialStructure> Initializer::ChooseStructure(const TwoViewResult
                           options_.two_view.min_points);
     return std::nullopt;
   }
-  return best;
+  return InitialProposal{std::move(best), {}, is_certain};
 }
 
-void Initializer::BuildMap(const InitialStructure& structure, const std::vector<Match>& matches, Frame* frame,
-                           Map* map) {
+void Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
+  const InitialStructure& structure = proposal.structure;
+  const std::vector<Match>& matches = proposal.matches;
   std::vector<double> depths;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (structure.is_good[i] != 0) depths.push_back(structure.points_in_reference[i].z());

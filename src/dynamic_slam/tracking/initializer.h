@@ -15,15 +15,30 @@
 
 namespace dynamic_slam {
 
+// Two views of which a first map can be made.
+struct InitialProposal {
+  InitialStructure structure;
+  std::vector<Match> matches;  // keypoints of the reference view and of the last one
+  // One motion is clearly better than any other. When it is not, a map of the better one is worth a try, but can turn
+  // out wrong: go on asking.
+  bool is_certain = false;
+};
+
 // Waits for two frames from which the first map can be made.
 class Initializer {
  public:
   Initializer(const Camera& camera, const InitializerOptions& options, std::vector<float> octave_scales);
 
-  // Matches the frame with the reference frame and tries to find the motion between them. When it succeeds the map,
-  // which must be empty, gets two keyframes and their landmarks (median depth 1 in the first), and the frame its
-  // pose, landmarks and reference. Otherwise reason() says why not.
-  bool TryFrame(Frame* frame, Random& random, Map* map);
+  // Matches the frame with the reference frame and tries to find the motion between them and the structure. Nothing
+  // while that is not possible: reason() says why.
+  std::optional<InitialProposal> Propose(const Frame& frame, Random& random);
+
+  // Gives the map, which must be empty, two keyframes and their landmarks (median depth 1 in the first), and the frame,
+  // which is the one of the proposal, its pose, landmarks and reference.
+  void BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
+
+  // The frame with which all are matched; not valid before the first.
+  FrameId reference() const { return reference_.has_value() ? reference_->id : FrameId(); }
 
   const std::string& reason() const { return reason_; }
   void Reset();
@@ -31,9 +46,8 @@ class Initializer {
  private:
   void StartFrom(const Frame& frame);
   void AddView(const Frame& frame, const std::vector<Match>& matches);
-  // The one structure that fits all views; nothing, and the reason, when there is none or more than one.
-  std::optional<InitialStructure> ChooseStructure(const TwoViewResult& result);
-  void BuildMap(const InitialStructure& structure, const std::vector<Match>& matches, Frame* frame, Map* map);
+  // The structure that fits all views best; nothing, and the reason, when there is none or another fits as well.
+  std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result);
   double ScaleOf(const Keypoint& keypoint) const { return octave_scales_[static_cast<size_t>(keypoint.octave)]; }
   std::vector<Match> MatchWithReference(const Frame& frame);
 

@@ -17,7 +17,14 @@ class InitializerTest : public ::testing::Test {
  protected:
   bool Try(const Rigid3& cam_from_world) {
     views_.push_back(world_.See(cam_from_world));
-    return initializer_.TryFrame(&views_.back().frame, random_, &map_);
+    return Start(&views_.back().frame);
+  }
+
+  bool Start(Frame* frame) {
+    const std::optional<InitialProposal> proposal = initializer_.Propose(*frame, random_);
+    if (!proposal.has_value() || !proposal->is_certain) return false;
+    initializer_.BuildMap(*proposal, frame, &map_);
+    return true;
   }
 
   SyntheticWorld world_{1500, 0.1};
@@ -71,7 +78,7 @@ TEST_F(InitializerTest, StartsAgainWhenTheFirstViewIsOutOfSight) {
 TEST_F(InitializerTest, TooFewKeypointsAreNoFirstView) {
   SyntheticWorld poor(60);
   SyntheticView view = poor.See(Rigid3());
-  EXPECT_FALSE(initializer_.TryFrame(&view.frame, random_, &map_));
+  EXPECT_FALSE(Start(&view.frame));
   EXPECT_THAT(initializer_.reason(), HasSubstr(std::to_string(view.points.size()) + " keypoints < 100"));
   EXPECT_FALSE(Try(SidewaysPose(0)));
   EXPECT_THAT(initializer_.reason(), HasSubstr("second view")) << "the poor view is not kept";

@@ -14,6 +14,16 @@ constexpr double kRelocalisedSearch = 3.0;
 
 constexpr int kLocalMapPasses = 2;
 
+// An uncertain start is believed after so many frames without a better one.
+constexpr uint32_t kMaxReviews = 60;
+
+// Whether two motions from the same view are one, the scale of the translation apart. Rivals differ by more.
+bool Agree(const Rigid3& a, const Rigid3& b) {
+  constexpr double kMaxRotationRad = 0.02, kMinDirectionCosine = 0.95;
+  return RotationAngle(a.rotation, b.rotation) < kMaxRotationRad &&
+         a.translation.normalized().dot(b.translation.normalized()) > kMinDirectionCosine;
+}
+
 }  // namespace
 
 const char* Name(TrackingState state) {
@@ -43,7 +53,8 @@ TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& gre
   std::swap(frame_, last_);
   frame_.id = id;
   frame_.timestamp_s = timestamp_s;
-  const double factor = state_ == TrackingState::kInitialising ? options_.initializer.feature_factor : 1.0;
+  const bool is_starting = state_ == TrackingState::kInitialising || !start_is_certain_;
+  const double factor = is_starting ? options_.initializer.feature_factor : 1.0;
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
   frame_.grid.Build(frame_.features, bounds_);
@@ -67,13 +78,14 @@ TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& gre
           frame_.cam_from_world * map_->keyframes().At(frame_.reference).cam_from_world().Inverse();
       velocity_ = last_has_pose_ ? std::optional<Rigid3>(frame_.cam_from_world * last_.cam_from_world.Inverse())
                                  : std::nullopt;
-      InsertKeyframeIfDue(&result);
+      if (!start_is_certain_) ReviewStart(&result);
+      if (state_ == TrackingState::kTracking && !result.map_was_reset) InsertKeyframeIfDue(&result);
     } else {
       velocity_.reset();
       ++lost_frames_;
       GiveUpSmallMap(&result);
     }
-    last_has_pose_ = tracked;
+    last_has_pose_ = state_ == TrackingState::kTracking;
   }
   result.state = state_;
   result.inliers = inliers_;
@@ -82,18 +94,57 @@ TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& gre
 }
 
 void Tracker::Initialise(TrackingResult* result) {
-  const bool succeeded = initializer_.TryFrame(&frame_, random_, map_);
+  const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
   reason_ = initializer_.reason();
-  if (!succeeded) return;
+  if (proposal.has_value()) StartMap(*proposal, result);
+}
+
+void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) {
+  initializer_.BuildMap(proposal, &frame_, map_);
+  start_is_certain_ = proposal.is_certain;
+  if (start_is_certain_) initializer_.Reset();
   state_ = TrackingState::kTracking;
+  start_frame_ = frame_.id;
   last_has_pose_ = true;
   velocity_.reset();
-  initializer_.Reset();
   last_keyframe_ = frame_.reference;
   last_keyframe_frame_ = frame_.id;
   most_inliers_ = 0;
   inliers_ = map_->keyframes().At(last_keyframe_).LandmarkCount();
+  result->new_keyframes.clear();
   map_->keyframes().ForEach([result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
+}
+
+void Tracker::ReviewStart(TrackingResult* result) {
+  const FrameId reference = initializer_.reference();
+  const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
+  if (initializer_.reference() != reference) {
+    // The first view is out of sight, and nobody knows which motion it was.
+    EmptyMap(result);
+    reason_ = initializer_.reason();
+    return;
+  }
+  const bool is_certain = proposal.has_value() && proposal->is_certain;
+  if (is_certain && !Agree(frame_.cam_from_world, proposal->structure.last_from_reference)) {
+    EmptyMap(result);
+    StartMap(*proposal, result);
+    reason_ = "another motion fits better: " + initializer_.reason();
+    return;
+  }
+  const bool is_long_ago = frame_.id.value() - start_frame_.value() >= kMaxReviews;
+  if (!is_certain && !is_long_ago) return;
+  start_is_certain_ = true;
+  initializer_.Reset();
+}
+
+void Tracker::EmptyMap(TrackingResult* result) {
+  *map_ = Map(map_->octave_scales());
+  state_ = TrackingState::kInitialising;
+  start_is_certain_ = true;
+  last_has_pose_ = false;
+  result->map_was_reset = true;
+  result->new_keyframes.clear();
+  lost_frames_ = 0;
 }
 
 // Local mapping may have moved, merged or erased what the last frame saw, and added to it.
@@ -190,10 +241,8 @@ void Tracker::GiveUpSmallMap(TrackingResult* result) {
   }
   reason_ = fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_,
                         map_->keyframes().size());
-  *map_ = Map(map_->octave_scales());
-  state_ = TrackingState::kInitialising;
-  result->map_was_reset = true;
-  lost_frames_ = 0;
+  EmptyMap(result);
+  initializer_.Reset();
 }
 
 }  // namespace dynamic_slam

@@ -52,6 +52,10 @@ class Tracker {
 
  private:
   void Initialise(TrackingResult* result);
+  void StartMap(const InitialProposal& proposal, TrackingResult* result);
+  // While the start is not certain: whether the map is still believed.
+  void ReviewStart(TrackingResult* result);
+  void EmptyMap(TrackingResult* result);
   bool TrackFrame();
   bool Relocalise();
   bool TrackLocalMap(double radius_px, int min_inliers);
@@ -74,9 +78,11 @@ class Tracker {
   TrackingState state_ = TrackingState::kInitialising;
   Frame frame_, last_;
   bool last_has_pose_ = false;
+  bool start_is_certain_ = true;
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
   KeyframeId last_keyframe_;
   FrameId last_keyframe_frame_;
+  FrameId start_frame_;
   int lost_frames_ = 0;
   int inliers_ = 0;
   int most_inliers_ = 0;  // since the last keyframe
