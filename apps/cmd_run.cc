@@ -51,9 +51,12 @@ Camera ChooseCamera(const RunArguments& arguments, const FrameSource& source) {
 
 std::filesystem::path OutputFolder(const RunArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
-  std::filesystem::path source = std::filesystem::path(arguments.source).lexically_normal();
+  std::filesystem::path source = std::filesystem::absolute(arguments.source).lexically_normal();
   if (source.filename().empty()) source = source.parent_path();
-  return std::filesystem::path("out") / source.stem();
+  if (!std::filesystem::is_directory(source)) return std::filesystem::path("out") / source.stem();
+  // EuRoC's folders all have these names.
+  while (source.filename() == "mav0" || source.filename() == "cam0") source = source.parent_path();
+  return std::filesystem::path("out") / source.filename();
 }
 
 void RunSource(const RunArguments& arguments, int* exit_code) {
@@ -67,7 +70,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
 
   SlamSystem system(camera, options);
   RunConsole console(arguments.quiet);
-  RunSummary summary = RunSequence(*source, system, [&console](const RunProgress& p) { return console.Show(p); });
+  RunSummary summary =
+      RunSequence(*source, system, [&console](const RunProgress& p) { return console.Show(p); });
   summary.source = arguments.source;
   console.End();
   WriteResults(out, system, summary);
@@ -87,15 +91,21 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->add_option("SOURCE", a.source,
                    "Folder in TUM RGB-D, KITTI odometry or EuRoC layout, folder of images, or video file")
       ->required();
-  command->add_option("--camera", a.camera, "Name of a known camera, or camera file (default: what SOURCE says)");
-  command->add_option("--config", a.config, "YAML file with options (the keys of config.yaml in the results)");
-  command->add_option("--set", a.assignments, "One option, key=value; may be repeated")->type_name("KEY=VALUE");
-  command->add_option("--detector", a.detector, "Object detector")->check(CLI::IsMember({"none"}))->capture_default_str();
+  command->add_option("--camera", a.camera,
+                      "Name of a known camera, or camera file (default: what SOURCE says)");
+  command->add_option("--config", a.config,
+                      "YAML file with options (the keys of config.yaml in the results)");
+  command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
+      ->type_name("KEY=VALUE");
+  command->add_option("--detector", a.detector, "Object detector")
+      ->check(CLI::IsMember({"none"}))
+      ->capture_default_str();
   command->add_option("--mode", a.mode, "offline: every frame, reproducible")
       ->check(CLI::IsMember({"offline"}))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
-  command->add_option("--start", a.source_options.start, "Frames to skip first")->check(CLI::NonNegativeNumber);
+  command->add_option("--start", a.source_options.start, "Frames to skip first")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--max-frames", a.source_options.max_frames, "Frames to run at most (0: all)")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--fps", a.source_options.fps, "Frames a second of a folder of images (30) or a video")

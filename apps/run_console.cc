@@ -1,10 +1,9 @@
 #include "run_console.h"
 
-#include <unistd.h>
-
 #include <csignal>
 
 #include <fmt/core.h>
+#include <unistd.h>
 
 namespace dynamic_slam {
 namespace {
@@ -13,9 +12,15 @@ using Clock = std::chrono::steady_clock;
 
 volatile std::sig_atomic_t interrupted = 0;
 
-void OnInterrupt(int /*signal*/) { interrupted = 1; }
+// A second one ends the program at once.
+void OnInterrupt(int signal) {
+  interrupted = 1;
+  std::signal(signal, SIG_DFL);
+}
 
-double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 }  // namespace
 
@@ -39,8 +44,8 @@ bool RunConsole::Show(const RunProgress& progress) {
   last_state_ = tracking.state;
   if (changed) {
     End();
-    fmt::print(stderr, "frame {}: {}{}{}\n", progress.frame, Name(tracking.state), tracking.reason.empty() ? "" : ": ",
-               tracking.reason);
+    fmt::print(stderr, "frame {}: {}{}{}\n", progress.frame - 1, Name(tracking.state),
+               tracking.reason.empty() ? "" : ": ", tracking.reason);
   }
   // A file gets a line every five seconds, a terminal five a second.
   if (SecondsSince(last_line_) < (overwrite_ ? 0.2 : 5.0)) return true;
@@ -48,8 +53,8 @@ bool RunConsole::Show(const RunProgress& progress) {
   const std::string total = progress.frames_total > 0 ? fmt::format("/{}", progress.frames_total) : "";
   fmt::print(stderr, "{}frame {}{}  {:.0f} frames/s  {}  {} inliers  {} keyframes  {} landmarks  {}{}",
              overwrite_ ? "\r\033[K" : "", progress.frame, total,
-             static_cast<double>(progress.frame) / SecondsSince(start_), Name(tracking.state), tracking.inliers,
-             progress.map->keyframes().size(), progress.map->landmarks().size(),
+             static_cast<double>(progress.frame) / SecondsSince(start_), Name(tracking.state),
+             tracking.inliers, progress.map->keyframes().size(), progress.map->landmarks().size(),
              tracking.state == TrackingState::kTracking ? "" : tracking.reason, overwrite_ ? "" : "\n");
   line_open_ = overwrite_;
   std::fflush(stderr);
@@ -70,7 +75,8 @@ void PrintSummary(const RunSummary& summary) {
   } else {
     fmt::print("no map was made: {}\n", summary.last_reason);
   }
-  for (const SourceProblem& problem : summary.skipped) fmt::print("skipped {}: {}\n", problem.name, problem.reason);
+  for (const SourceProblem& problem : summary.skipped)
+    fmt::print("skipped {}: {}\n", problem.name, problem.reason);
   fmt::print("tracking {:.1f} ms a frame (median), mapping {:.1f} ms a keyframe, {:.1f} s in all\n",
              summary.tracking_ms.median, summary.mapping_ms.median, summary.wall_s);
 }

@@ -77,7 +77,8 @@ class CliRunTest(unittest.TestCase):
         self.assertEqual(sorted(summary["tracking_ms"]), ["max", "mean", "median", "p95"])
         self.assertEqual(summary["frames_total"], FRAMES)
         self.assertAlmostEqual(summary["coverage"], summary["frames_tracked"] / FRAMES)
-        self.assertEqual(summary["frames_tracked"], len(data_lines(out, "trajectory.txt")))
+        self.assertEqual(summary["frames_tracked"] + summary["frames_backfilled"],
+                         len(data_lines(out, "trajectory.txt")))
         self.assertEqual(summary["keyframes"], len(data_lines(out, "keyframes.txt")))
         self.assertIn(f"element vertex {summary['landmarks']}\n", read(out, "map.ply"))
         self.assertEqual(len(read(out, "frames.csv").splitlines()), FRAMES + 1)
@@ -147,7 +148,8 @@ class CliRunTest(unittest.TestCase):
         summary = json.loads(read(out, "summary.json"))
         self.assertTrue(summary["interrupted"])
         self.assertLess(summary["frames_total"], FRAMES)
-        self.assertEqual(len(data_lines(out, "trajectory.txt")), summary["frames_tracked"])
+        self.assertEqual(len(data_lines(out, "trajectory.txt")),
+                         summary["frames_tracked"] + summary["frames_backfilled"])
 
     def test_demo(self):
         out = os.path.join(self.folder, "a")

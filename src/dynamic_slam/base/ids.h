@@ -2,7 +2,6 @@
 
 #include <compare>
 #include <cstdint>
-#include <functional>
 #include <limits>
 
 namespace dynamic_slam {
@@ -29,8 +28,3 @@ using KeyframeId = Id<struct KeyframeTag>;
 using LandmarkId = Id<struct LandmarkTag>;
 
 }  // namespace dynamic_slam
-
-template <class Tag>
-struct std::hash<dynamic_slam::Id<Tag>> {
-  size_t operator()(dynamic_slam::Id<Tag> id) const noexcept { return std::hash<uint32_t>()(id.value()); }
-};

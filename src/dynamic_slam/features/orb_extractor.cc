@@ -41,7 +41,6 @@ class OrbExtractor::Impl {
       level.blurred = blurred_(cv::Rect(0, 0, width, height));
       level.scale_x = static_cast<float>(width_) / static_cast<float>(width);
       level.scale_y = static_cast<float>(height_) / static_cast<float>(height);
-      scales_.push_back(static_cast<float>(scale));
       weights_.push_back(1 / scale);
       scale *= options.scale_factor;
     }
@@ -79,8 +78,6 @@ class OrbExtractor::Impl {
     DS_CHECK(features > 0, "features={}", features);
     options_.features = features;
   }
-
-  const std::vector<float>& scales() const { return scales_; }
 
  private:
   struct Level {
@@ -125,7 +122,6 @@ class OrbExtractor::Impl {
   UndistortionTable undistortion_;
   cv::Mat blurred_;  // CV_8UC1, the memory of Level::blurred
   std::vector<Level> levels_;
-  std::vector<float> scales_;
   std::vector<double> weights_;  // share of the features: 1 / scale
   std::vector<int> available_;
   std::vector<uint8_t> row_;  // scratch of Smooth
@@ -141,6 +137,13 @@ void OrbExtractor::Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet*
 
 void OrbExtractor::SetFeatures(int features) { impl_->SetFeatures(features); }
 
-const std::vector<float>& OrbExtractor::OctaveScales() const { return impl_->scales(); }
+std::vector<float> OctaveScales(const OrbOptions& options) {
+  std::vector<float> scales;
+  double scale = 1;
+  for (int octave = 0; octave < options.levels; ++octave, scale *= options.scale_factor) {
+    scales.push_back(static_cast<float>(scale));
+  }
+  return scales;
+}
 
 }  // namespace dynamic_slam

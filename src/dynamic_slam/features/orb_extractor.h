@@ -11,6 +11,9 @@
 
 namespace dynamic_slam {
 
+// scale_factor^octave: the size in full-resolution px of one pixel of each octave.
+std::vector<float> OctaveScales(const OrbOptions& options);
+
 // ORB features (Rublee et al. 2011), evenly spread over the image and the pyramid. Keeps its buffers between
 // calls: not for use by two threads at once.
 class OrbExtractor {
@@ -24,9 +27,6 @@ class OrbExtractor {
 
   // Wanted keypoints per image from now on; used to extract more until the map is initialised.
   void SetFeatures(int features);
-
-  // scale_factor^octave: the size in full-resolution px of one pixel of the octave.
-  const std::vector<float>& OctaveScales() const;
 
  private:
   class Impl;

@@ -1,16 +1,19 @@
 #include "dynamic_slam/geometry/camera.h"
 
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "dynamic_slam/base/error.h"
 
 namespace dynamic_slam {
 namespace {
+
+// No keypoint fits into a smaller image.
+constexpr int kMinSizePx = 16;
 
 // Distorted normalised coordinates and, when asked for, their 2x2 derivative.
 Eigen::Vector2d DistortNormalised(const Camera& camera, const Eigen::Vector2d& x, Eigen::Matrix2d* jacobian) {
@@ -81,7 +84,10 @@ void Camera::Validate() const {
   const auto require = [&problems](bool holds, const std::string& text) {
     if (!holds) problems += (problems.empty() ? "" : "; ") + text;
   };
-  require(width > 0 && height > 0, fmt::format("width and height must be positive, are {} x {}", width, height));
+  require(width > 0 && height > 0,
+          fmt::format("width and height must be positive, are {} x {}", width, height));
+  require(width <= 0 || height <= 0 || (width >= kMinSizePx && height >= kMinSizePx),
+          fmt::format("width and height must be at least {}, are {} x {}", kMinSizePx, width, height));
   require(std::isfinite(fx) && fx > 0, fmt::format("fx must be positive, is {}", fx));
   require(std::isfinite(fy) && fy > 0, fmt::format("fy must be positive, is {}", fy));
   require(std::isfinite(cx) && cx > 0 && cx < width, fmt::format("cx must lie in the image, is {}", cx));

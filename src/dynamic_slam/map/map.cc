@@ -12,8 +12,9 @@ namespace dynamic_slam {
 namespace {
 
 auto FindObservation(const std::vector<Observation>& observations, KeyframeId keyframe) {
-  return std::lower_bound(observations.begin(), observations.end(), keyframe,
-                          [](const Observation& observation, KeyframeId id) { return observation.keyframe < id; });
+  return std::lower_bound(
+      observations.begin(), observations.end(), keyframe,
+      [](const Observation& observation, KeyframeId id) { return observation.keyframe < id; });
 }
 
 }  // namespace
@@ -27,10 +28,11 @@ void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id
   Keyframe& keyframe = keyframes_.At(keyframe_id);
   Landmark& landmark = landmarks_.At(landmark_id);
   DS_CHECK(keypoint < keyframe.landmarks_.size(), "keypoint={}", keypoint);
-  DS_CHECK(!keyframe.landmarks_[keypoint].IsValid(), "keyframe={} keypoint={}", keyframe_id.value(), keypoint);
+  DS_CHECK(!keyframe.landmarks_[keypoint].IsValid(), "keyframe={} keypoint={}", keyframe_id.value(),
+           keypoint);
   const auto position = FindObservation(landmark.observations_, keyframe_id);
-  DS_CHECK(position == landmark.observations_.end() || position->keyframe != keyframe_id, "keyframe={} landmark={}",
-           keyframe_id.value(), landmark_id.value());
+  DS_CHECK(position == landmark.observations_.end() || position->keyframe != keyframe_id,
+           "keyframe={} landmark={}", keyframe_id.value(), landmark_id.value());
   for (const Observation& other : landmark.observations_) {
     keyframe.ChangeWeight(other.keyframe, 1);
     keyframes_.At(other.keyframe).ChangeWeight(keyframe_id, 1);
@@ -75,7 +77,8 @@ void Map::EraseKeyframe(KeyframeId id, KeyframeId heir) {
     if (keyframes_.At(id).landmarks_[keypoint].IsValid()) Unlink(id, keypoint);
   }
   if (heirs_.size() <= id.value()) heirs_.resize(id.value() + 1);
-  heirs_[id.value()] = {heir, keyframes_.At(id).cam_from_world() * keyframes_.At(heir).cam_from_world().Inverse()};
+  heirs_[id.value()] = {heir,
+                        keyframes_.At(id).cam_from_world() * keyframes_.At(heir).cam_from_world().Inverse()};
   keyframes_.Erase(id);
 }
 
@@ -160,7 +163,8 @@ double Map::MedianDepth(KeyframeId id) const {
   const Keyframe& keyframe = keyframes_.At(id);
   std::vector<double> depths;
   for (const LandmarkId landmark : keyframe.landmarks()) {
-    if (landmark.IsValid()) depths.push_back((keyframe.cam_from_world() * landmarks_.At(landmark).position()).z());
+    if (landmark.IsValid())
+      depths.push_back((keyframe.cam_from_world() * landmarks_.At(landmark).position()).z());
   }
   if (depths.empty()) return 0;
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
@@ -168,20 +172,15 @@ double Map::MedianDepth(KeyframeId id) const {
   return *middle;
 }
 
-void Map::Scale(double factor) {
-  keyframes_.ForEach([factor](Keyframe& keyframe) { keyframe.cam_from_world_.translation *= factor; });
-  landmarks_.ForEach([factor](Landmark& landmark) { landmark.position_ *= factor; });
-  for (Anchor& heir : heirs_) heir.original_from_keyframe.translation *= factor;
-  landmarks_.ForEach([this](Landmark& landmark) { RefreshLandmark(landmark.id()); });
-}
-
 std::vector<std::string> Map::Validate() const {
   std::vector<std::string> problems;
   std::map<std::pair<KeyframeId, KeyframeId>, int> weights;
   landmarks_.ForEach([&](const Landmark& landmark) {
     const uint32_t id = landmark.id().value();
-    if (landmark.observations().size() < 2) problems.push_back(fmt::format("landmark {}: fewer than two observations", id));
-    if (!landmark.position().allFinite()) problems.push_back(fmt::format("landmark {}: position is not finite", id));
+    if (landmark.observations().size() < 2)
+      problems.push_back(fmt::format("landmark {}: fewer than two observations", id));
+    if (!landmark.position().allFinite())
+      problems.push_back(fmt::format("landmark {}: position is not finite", id));
     KeyframeId previous;
     for (const Observation& observation : landmark.observations()) {
       const Keyframe* keyframe = keyframes_.Find(observation.keyframe);
@@ -191,7 +190,8 @@ std::vector<std::string> Map::Validate() const {
       previous = observation.keyframe;
       if (keyframe == nullptr || observation.keypoint >= keyframe->landmarks().size() ||
           keyframe->landmarks()[observation.keypoint] != landmark.id()) {
-        problems.push_back(fmt::format("landmark {}: keyframe {} does not know of it", id, observation.keyframe.value()));
+        problems.push_back(
+            fmt::format("landmark {}: keyframe {} does not know of it", id, observation.keyframe.value()));
       }
       for (const Observation& other : landmark.observations()) {
         if (other.keyframe != observation.keyframe) ++weights[{observation.keyframe, other.keyframe}];
@@ -200,7 +200,8 @@ std::vector<std::string> Map::Validate() const {
   });
   keyframes_.ForEach([&](const Keyframe& keyframe) {
     const uint32_t id = keyframe.id().value();
-    if (!keyframe.cam_from_world().IsFinite()) problems.push_back(fmt::format("keyframe {}: pose is not finite", id));
+    if (!keyframe.cam_from_world().IsFinite())
+      problems.push_back(fmt::format("keyframe {}: pose is not finite", id));
     int count = 0;
     for (uint32_t keypoint = 0; keypoint < keyframe.landmarks().size(); ++keypoint) {
       const LandmarkId landmark_id = keyframe.landmarks()[keypoint];
@@ -208,10 +209,12 @@ std::vector<std::string> Map::Validate() const {
       ++count;
       const Landmark* landmark = landmarks_.Find(landmark_id);
       if (landmark == nullptr || !landmark->IsSeenBy(keyframe.id())) {
-        problems.push_back(fmt::format("keyframe {}: keypoint {} links a landmark that does not link back", id, keypoint));
+        problems.push_back(
+            fmt::format("keyframe {}: keypoint {} links a landmark that does not link back", id, keypoint));
       }
     }
-    if (count != keyframe.LandmarkCount()) problems.push_back(fmt::format("keyframe {}: counts its landmarks wrongly", id));
+    if (count != keyframe.LandmarkCount())
+      problems.push_back(fmt::format("keyframe {}: counts its landmarks wrongly", id));
     for (const CovisibleKeyframe& other : keyframe.covisible()) {
       const auto weight = weights.find({keyframe.id(), other.id});
       if (weight == weights.end() || weight->second != other.weight) {
@@ -222,7 +225,8 @@ std::vector<std::string> Map::Validate() const {
     }
   });
   for (const auto& [pair, weight] : weights) {
-    problems.push_back(fmt::format("keyframe {}: lacks covisibility with {}", pair.first.value(), pair.second.value()));
+    problems.push_back(
+        fmt::format("keyframe {}: lacks covisibility with {}", pair.first.value(), pair.second.value()));
   }
   return problems;
 }

@@ -12,11 +12,11 @@ namespace dynamic_slam {
 
 // Keyframes, landmarks and who sees what: the one object that the stages share.
 //
-// Each link between a keypoint and a landmark is kept on both sides, and each pair of keyframes knows how many
-// landmarks it shares; both hold after every call.
+// Each link between a keypoint and a landmark is kept on both sides, and each pair of keyframes knows how
+// many landmarks it shares; both hold after every call.
 class Map {
  public:
-  // octave_scales: size of a pixel of each octave in full-resolution px (OrbExtractor::OctaveScales).
+  // octave_scales: size of a pixel of each octave in full-resolution px (OctaveScales of features).
   explicit Map(std::vector<float> octave_scales) : octave_scales_(std::move(octave_scales)) {}
 
   Keyframe& AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world, FeatureSet features,
@@ -66,9 +66,6 @@ class Map {
 
   // Median depth of the keyframe's landmarks in its camera; 0 when there are none.
   double MedianDepth(KeyframeId id) const;
-
-  // Multiplies all lengths.
-  void Scale(double factor);
 
   // Everything that is wrong with the map, recomputed from scratch; empty when nothing is.
   std::vector<std::string> Validate() const;

@@ -13,7 +13,9 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 class MapBundle {
  public:
   explicit MapBundle(Map* map)
-      : map_(map), pose_of_(map->keyframes().CreatedCount(), kNone), seen_(map->landmarks().CreatedCount(), 0) {}
+      : map_(map),
+        pose_of_(map->keyframes().CreatedCount(), kNone),
+        seen_(map->landmarks().CreatedCount(), 0) {}
 
   void AddPose(KeyframeId id, bool fixed) {
     pose_of_[id.value()] = static_cast<uint32_t>(problem_.poses.size());
@@ -31,7 +33,8 @@ class MapBundle {
   }
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
-  BundleSummary Solve(const Camera& camera, const BundleOptions& options, const std::function<bool()>& should_stop) {
+  BundleSummary Solve(const Camera& camera, const BundleOptions& options,
+                      const std::function<bool()>& should_stop) {
     for (const LandmarkId id : landmarks_) {
       const Landmark& landmark = map_->landmarks().At(id);
       const uint32_t point = static_cast<uint32_t>(problem_.points.size());
@@ -39,7 +42,8 @@ class MapBundle {
       for (const Observation& observation : landmark.observations()) {
         if (!HasPose(observation.keyframe)) continue;
         const Keypoint& keypoint = map_->keyframes().At(observation.keyframe).keypoint(observation.keypoint);
-        problem_.observations.push_back({pose_of_[observation.keyframe.value()], point,
+        problem_.observations.push_back({pose_of_[observation.keyframe.value()],
+                                         point,
                                          {keypoint.x, keypoint.y},
                                          1.0 / map_->octave_scales()[static_cast<size_t>(keypoint.octave)],
                                          1.0});
@@ -55,14 +59,16 @@ class MapBundle {
  private:
   void WriteBack(const std::vector<uint8_t>& is_outlier) {
     for (size_t i = 0; i < keyframes_.size(); ++i) {
-      if (!problem_.poses[i].fixed) map_->keyframes().At(keyframes_[i]).set_cam_from_world(problem_.poses[i].cam_from_world);
+      if (!problem_.poses[i].fixed)
+        map_->keyframes().At(keyframes_[i]).set_cam_from_world(problem_.poses[i].cam_from_world);
     }
     for (size_t i = 0; i < landmarks_.size(); ++i) {
       map_->landmarks().At(landmarks_[i]).set_position(problem_.points[i].position);
     }
     for (size_t i = 0; i < is_outlier.size(); ++i) {
       // The landmark may have gone with an earlier link.
-      if (is_outlier[i] != 0 && map_->keyframes().At(links_[i].keyframe).landmarks()[links_[i].keypoint].IsValid()) {
+      if (is_outlier[i] != 0 &&
+          map_->keyframes().At(links_[i].keyframe).landmarks()[links_[i].keypoint].IsValid()) {
         map_->Unlink(links_[i].keyframe, links_[i].keypoint);
       }
     }
@@ -109,15 +115,17 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
   if (fixed.size() > static_cast<size_t>(options.fixed_keyframes)) {
     fixed.resize(static_cast<size_t>(options.fixed_keyframes));
   }
-  // With nobody outside to hold them, the oldest holds the others.
-  const KeyframeId anchor = fixed.empty() ? *std::min_element(local.begin(), local.end()) : KeyframeId();
-  for (const KeyframeId keyframe : local) bundle.AddPose(keyframe, keyframe == anchor);
+  // The first keyframe is the origin of the world. With fewer than two outside to hold the others, the oldest
+  // does.
+  const KeyframeId oldest = *std::min_element(local.begin(), local.end());
+  const bool oldest_is_fixed = oldest == KeyframeId(0) || fixed.size() < 2;
+  for (const KeyframeId keyframe : local) bundle.AddPose(keyframe, oldest_is_fixed && keyframe == oldest);
   for (const KeyframeId keyframe : fixed) bundle.AddPose(keyframe, true);
   return bundle.Solve(camera, options.local_bundle, should_stop);
 }
 
-BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, const std::function<bool()>& should_stop,
-                        Map* map) {
+BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
+                        const std::function<bool()>& should_stop, Map* map) {
   MapBundle bundle(map);
   bool first = true;
   map->keyframes().ForEach([&](const Keyframe& keyframe) {

@@ -1,9 +1,5 @@
 #include "dynamic_slam/system/sequence_runner.h"
 
-#include <sys/resource.h>
-#include <time.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <fstream>
@@ -12,6 +8,9 @@
 #include <system_error>
 
 #include <nlohmann/json.hpp>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
@@ -92,15 +91,17 @@ void WriteText(const std::filesystem::path& file, const std::string& text) {
   std::error_code error;
   if (stream) std::filesystem::rename(temporary, file, error);
   if (!stream || error) {
-    throw InputError(file.string(), "cannot be written", "Choose another folder with --out, or free some space.");
+    throw InputError(file.string(), "cannot be written",
+                     "Choose another folder with --out, or free some space.");
   }
 }
 
 std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
-  std::string csv = "timestamp,state,keypoints,inliers,new_keyframes,tracking_ms,reason\n";
+  std::string csv = "timestamp,state,keypoints,inliers,keyframe,tracking_ms,reason\n";
   for (const RunSummary::FrameRecord& frame : frames) {
-    csv += fmt::format("{:.9f},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state), frame.keypoints,
-                       frame.inliers, frame.new_keyframes, frame.tracking_ms, frame.reason);
+    csv += fmt::format("{:.9f},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state),
+                       frame.keypoints, frame.inliers, Name(frame.keyframe_reason), frame.tracking_ms,
+                       frame.reason);
   }
   return csv;
 }
@@ -113,7 +114,7 @@ TimeStatistics SummariseTimes(std::vector<double> times) {
   const size_t n = times.size();
   const double sum = std::accumulate(times.begin(), times.end(), 0.0);
   return {n % 2 == 1 ? times[n / 2] : 0.5 * (times[n / 2 - 1] + times[n / 2]), sum / static_cast<double>(n),
-          times[std::min(n - 1, n * 95 / 100)], times.back()};
+          times[(n * 95 + 99) / 100 - 1], times.back()};
 }
 
 RunSummary RunSequence(FrameSource& source, SlamSystem& system,
@@ -133,20 +134,20 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system,
     if (!image.has_value()) break;
     const FrameResult result = system.Process(image->timestamp_s, image->grey);
     const bool tracking = result.tracking.state == TrackingState::kTracking;
+    if (result.tracking.map_was_reset) {
+      ++summary.reset_count;
+      summary.initialised_at.reset();
+    }
     if (tracking) {
       if (!summary.initialised_at.has_value()) summary.initialised_at = frames;
       tracking_ms.push_back(result.tracking_ms);
     }
     if (!result.tracking.new_keyframes.empty()) mapping_ms.push_back(result.mapping_ms);
-    if (was_tracking && !tracking) ++summary.lost_count;
-    if (result.tracking.map_was_reset) {
-      ++summary.reset_count;
-      summary.initialised_at.reset();
-    }
+    if (was_tracking && result.tracking.state == TrackingState::kLost) ++summary.lost_count;
     was_tracking = tracking;
     summary.frames.push_back({image->timestamp_s, result.tracking.state, result.tracking.keypoints,
-                              result.tracking.inliers, static_cast<int>(result.tracking.new_keyframes.size()),
-                              result.tracking_ms, result.tracking.reason});
+                              result.tracking.inliers, result.tracking.keyframe_reason, result.tracking_ms,
+                              result.tracking.reason});
     summary.last_reason = tracking ? "" : result.tracking.reason;
     ++frames;
     const RunProgress progress{frames, source.FrameCount(), &result, &system.map()};
@@ -158,7 +159,8 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system,
   summary.skipped = source.Problems();
   summary.frames_total = summary.interrupted ? frames + summary.skipped.size()
                                              : std::max(source.FrameCount(), frames + summary.skipped.size());
-  summary.frames_tracked = system.FrameTrajectory().size();
+  summary.frames_tracked = system.LiveFrameCount();
+  summary.frames_backfilled = system.FrameTrajectory().size() - summary.frames_tracked;
   summary.keyframes = system.map().keyframes().size();
   summary.landmarks = system.map().landmarks().size();
   summary.tracking_ms = SummariseTimes(std::move(tracking_ms));
@@ -197,7 +199,8 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
       [&points](const Landmark& landmark) { points.push_back(landmark.position().cast<float>()); });
   WritePly(folder / "map.ply", points);
   WriteText(folder / "config.yaml", OptionsToYaml(system.options()));
-  WriteText(folder / "summary.json", ToJson(summary).dump(2) + "\n");
+  WriteText(folder / "summary.json",
+            ToJson(summary).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace dynamic_slam

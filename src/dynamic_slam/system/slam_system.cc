@@ -1,5 +1,6 @@
 #include "dynamic_slam/system/slam_system.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "dynamic_slam/base/error.h"
@@ -23,13 +24,14 @@ const Camera& Validated(const Camera& camera, const SystemOptions& options) {
 SlamSystem::SlamSystem(const Camera& camera, const SystemOptions& options)
     : camera_(Validated(camera, options)),
       options_(options),
-      map_(OrbExtractor(options.orb, camera).OctaveScales()),
+      map_(OctaveScales(options.orb)),
       tracker_(camera, options.orb, options.tracker, options.seed, &map_),
       mapper_(camera, options.mapper, &map_) {}
 
 FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
   DS_CHECK(grey.type() == CV_8UC1 && grey.cols == camera_.width && grey.rows == camera_.height,
-           "image {} x {} type {}, camera {} x {}", grey.cols, grey.rows, grey.type(), camera_.width, camera_.height);
+           "image {} x {} type {}, camera {} x {}", grey.cols, grey.rows, grey.type(), camera_.width,
+           camera_.height);
   FrameResult result;
   result.id = FrameId(frame_count_++);
   auto start = std::chrono::steady_clock::now();
@@ -45,9 +47,9 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const c
     if (result.tracking.new_keyframes.size() == 2) {
       // The first view had to wait for the second.
       const Keyframe& first = map_.keyframes().At(result.tracking.new_keyframes.front());
-      tracked_.push_back({first.timestamp_s(), first.id(), Rigid3()});
+      tracked_.push_back({first.timestamp_s(), first.id(), Rigid3(), false});
     }
-    tracked_.push_back({timestamp_s, frame.reference, frame.cam_from_reference});
+    tracked_.push_back({timestamp_s, frame.reference, frame.cam_from_reference, true});
   }
   start = std::chrono::steady_clock::now();
   for (const KeyframeId keyframe : result.tracking.new_keyframes) mapper_.Process(keyframe);
@@ -67,6 +69,11 @@ Trajectory SlamSystem::FrameTrajectory() const {
         {frame.timestamp_s, map_.PoseFromReference(frame.reference, frame.cam_from_reference).Inverse()});
   }
   return trajectory;
+}
+
+size_t SlamSystem::LiveFrameCount() const {
+  return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(),
+                                           [](const TrackedFrame& frame) { return frame.is_live; }));
 }
 
 Trajectory SlamSystem::KeyframeTrajectory() const {

@@ -23,14 +23,15 @@ struct FrameResult {
   double mapping_ms = 0;   // of the mapping that ran because of it
 };
 
-// Dynamic-SLAM in offline mode: every frame, one thread, one fixed order of the stages, so that the same images,
-// options and binary give the same map bit by bit.
+// Dynamic-SLAM in offline mode: every frame, one thread, one fixed order of the stages, so that the same
+// images, options and binary give the same map bit by bit.
 class SlamSystem {
  public:
   // Throws InputError when the camera or an option is out of range.
   SlamSystem(const Camera& camera, const SystemOptions& options);
 
-  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of that size, not 0 where keypoints are forbidden.
+  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of that size, not 0 where keypoints are
+  // forbidden.
   FrameResult Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask = {});
 
   // To be called once after the last image; adjusts the whole map. Poses and landmarks are final after it.
@@ -39,6 +40,9 @@ class SlamSystem {
   // The frames that have a pose, at where the map puts them now.
   Trajectory FrameTrajectory() const;
   Trajectory KeyframeTrajectory() const;
+
+  // Frames of FrameTrajectory that had their pose when their turn came.
+  size_t LiveFrameCount() const;
 
   const Map& map() const { return map_; }
   const Camera& camera() const { return camera_; }
@@ -50,6 +54,7 @@ class SlamSystem {
     double timestamp_s;
     KeyframeId reference;
     Rigid3 cam_from_reference;
+    bool is_live;  // not given its pose by a later frame
   };
 
   Camera camera_;

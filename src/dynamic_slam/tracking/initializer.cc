@@ -12,16 +12,19 @@ constexpr double kMatchRatio = 0.9;
 // Views beside the outer two: they make the first map more exact, and tell motions apart.
 constexpr size_t kMaxViewsBetween = 6;
 
-// Standard errors by which the better of two motions must be better. Errors of one scene are not independent, so more
-// than the usual three; and max_cost_ratio guards against what no such test sees, a rolling shutter that bends all.
+// Standard errors by which the better of two motions must be better. Errors of one scene are not independent,
+// so more than the usual three; and max_cost_ratio guards against what no such test sees, a rolling shutter
+// that bends all.
 constexpr double kMinPreference = 5.0;
 
-// The same, when the errors of the two are too alike to be certain. Above what a rolling shutter was seen to do.
+// The same, when the errors of the two are too alike to be certain. Above what a rolling shutter was seen to
+// do.
 constexpr double kMinTryPreference = 8.0;
 
 }  // namespace
 
-Initializer::Initializer(const Camera& camera, const InitializerOptions& options, std::vector<float> octave_scales)
+Initializer::Initializer(const Camera& camera, const InitializerOptions& options,
+                         std::vector<float> octave_scales)
     : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)) {
   Reset();
 }
@@ -55,8 +58,9 @@ std::vector<Match> Initializer::MatchWithReference(const Frame& frame) {
   for (uint32_t i = 0; i < first.size(); ++i) {
     const int octave = first.keypoints[i].octave;
     if (octave > options_.max_octave) continue;
-    const SearchWindow window{last_places_[i].x(), last_places_[i].y(), static_cast<float>(options_.search_radius_px),
-                              std::max(0, octave - 1), std::min(octave + 1, options_.max_octave)};
+    const SearchWindow window{last_places_[i].x(), last_places_[i].y(),
+                              static_cast<float>(options_.search_radius_px), std::max(0, octave - 1),
+                              std::min(octave + 1, options_.max_octave)};
     const WindowMatch match = FindInWindow(frame.features, frame.grid, window, first.descriptors[i], {});
     if (match.distance > kStrictDistance || match.distance > kMatchRatio * match.second_distance) continue;
     if (match.distance < takers[match.keypoint].distance) takers[match.keypoint] = {i, match.distance};
@@ -81,14 +85,14 @@ std::vector<Match> Initializer::MatchWithReference(const Frame& frame) {
 }
 
 std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& random) {
+  if (static_cast<int>(frame.features.size()) < options_.min_matches) {
+    reason_ = fmt::format("initialising: {} keypoints < {}; point the camera at something with texture",
+                          frame.features.size(), options_.min_matches);
+    return std::nullopt;
+  }
   if (!reference_.has_value()) {
-    if (static_cast<int>(frame.features.size()) < options_.min_matches) {
-      reason_ = fmt::format("initialising: {} keypoints < {}; point the camera at something with texture",
-                            frame.features.size(), options_.min_matches);
-    } else {
-      StartFrom(frame);
-      reason_ = "initialising: waiting for a second view";
-    }
+    StartFrom(frame);
+    reason_ = "initialising: waiting for a second view";
     return std::nullopt;
   }
   std::vector<Match> matches = MatchWithReference(frame);
@@ -122,7 +126,8 @@ void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches)
   if (!views_.last.empty()) views_.between.push_back(std::move(views_.last));
   // Of too many views every second one is enough.
   if (views_.between.size() > kMaxViewsBetween) {
-    for (size_t i = 0; 2 * i + 1 < views_.between.size(); ++i) views_.between[i] = std::move(views_.between[2 * i + 1]);
+    for (size_t i = 0; 2 * i + 1 < views_.between.size(); ++i)
+      views_.between[i] = std::move(views_.between[2 * i + 1]);
     views_.between.resize(views_.between.size() / 2);
   }
   views_.last.clear();
@@ -137,21 +142,30 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
     reason_ = "initialising: waiting for a third view, to be sure";
     return std::nullopt;
   }
-  InitialStructure best = RefineMotion(camera_, result.motion, views_);
+  std::vector<InitialStructure> structures{RefineMotion(camera_, result.motion, views_)};
+  for (const TwoViewMotion& rival : result.rivals) structures.push_back(RefineMotion(camera_, rival, views_));
+  std::stable_sort(
+      structures.begin(), structures.end(),
+      [](const InitialStructure& a, const InitialStructure& b) { return a.MeanCost() < b.MeanCost(); });
+  InitialStructure& best = structures.front();
   double cost_ratio = 0, preference = std::numeric_limits<double>::max();
-  for (const TwoViewMotion& rival : result.rivals) {
-    InitialStructure other = RefineMotion(camera_, rival, views_);
-    if (other.MeanCost() < best.MeanCost()) std::swap(best, other);
-    cost_ratio = std::max(cost_ratio, best.MeanCost() / other.MeanCost());
-    preference = std::min(preference, Preference(best, other));
+  for (size_t i = 1; i < structures.size(); ++i) {
+    cost_ratio = std::max(cost_ratio, best.MeanCost() / structures[i].MeanCost());
+    preference = std::min(preference, Preference(best, structures[i]));
   }
   const bool is_certain = preference > kMinPreference && cost_ratio < options_.max_cost_ratio;
   if (!is_certain && preference < kMinTryPreference) {
-    reason_ = fmt::format("initialising: two motions fit {} views, errors {:.2f} of each other > {:.2f}; "
-                          "show something out of the plane", views_.between.size() + 2, cost_ratio, options_.max_cost_ratio);
+    reason_ = fmt::format(
+        "initialising: two motions fit {} views, errors {:.2f} of each other (certain below {:.2f}), "
+        "{:.1f} standard errors apart < {:.1f}; show something out of the plane",
+        views_.between.size() + 2, cost_ratio, options_.max_cost_ratio, preference, kMinTryPreference);
     return std::nullopt;
   }
-  if (!best.usable || best.points < options_.two_view.min_points) {
+  if (!best.usable) {
+    reason_ = "initialising: the first bundle adjustment failed; trying the next image";
+    return std::nullopt;
+  }
+  if (best.points < options_.two_view.min_points) {
     reason_ = fmt::format("initialising: {} points survive the first bundle adjustment < {}", best.points,
                           options_.two_view.min_points);
     return std::nullopt;

@@ -19,22 +19,22 @@ namespace dynamic_slam {
 struct InitialProposal {
   InitialStructure structure;
   std::vector<Match> matches;  // keypoints of the reference view and of the last one
-  // One motion is clearly better than any other. When it is not, a map of the better one is worth a try, but can turn
-  // out wrong: go on asking.
+  // One motion is clearly better than any other. When it is not, a map of the better one is worth a try, but
+  // can turn out wrong: go on asking.
   bool is_certain = false;
 };
 
-// Waits for two frames from which the first map can be made.
+// Waits for frames from which the first map can be made: two far enough apart, and one between at least.
 class Initializer {
  public:
   Initializer(const Camera& camera, const InitializerOptions& options, std::vector<float> octave_scales);
 
-  // Matches the frame with the reference frame and tries to find the motion between them and the structure. Nothing
-  // while that is not possible: reason() says why.
+  // Matches the frame with the reference frame and tries to find the motion between them and the structure.
+  // Nothing while that is not possible: reason() says why.
   std::optional<InitialProposal> Propose(const Frame& frame, Random& random);
 
-  // Gives the map, which must be empty, two keyframes and their landmarks (median depth 1 in the first), and the frame,
-  // which is the one of the proposal, its pose, landmarks and reference.
+  // Gives the map, which must be empty, two keyframes and their landmarks (median depth 1 in the first), and
+  // the frame, which is the one of the proposal, its pose, landmarks and reference.
   void BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
 
   // The frame with which all are matched; not valid before the first.
@@ -46,9 +46,12 @@ class Initializer {
  private:
   void StartFrom(const Frame& frame);
   void AddView(const Frame& frame, const std::vector<Match>& matches);
-  // The structure that fits all views best; nothing, and the reason, when there is none or another fits as well.
+  // The structure that fits all views best; nothing, and the reason, when there is none or another fits as
+  // well.
   std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result);
-  double ScaleOf(const Keypoint& keypoint) const { return octave_scales_[static_cast<size_t>(keypoint.octave)]; }
+  double ScaleOf(const Keypoint& keypoint) const {
+    return octave_scales_[static_cast<size_t>(keypoint.octave)];
+  }
   std::vector<Match> MatchWithReference(const Frame& frame);
 
   Camera camera_;

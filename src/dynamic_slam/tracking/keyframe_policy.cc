@@ -12,6 +12,8 @@ const char* Name(KeyframeReason reason) {
   switch (reason) {
     case KeyframeReason::kNone:
       return "none";
+    case KeyframeReason::kStart:
+      return "start";
     case KeyframeReason::kNewView:
       return "new view";
     case KeyframeReason::kFewInliers:

@@ -11,10 +11,11 @@ struct KeyframePolicyInput {
 };
 
 enum class KeyframeReason {
-  kNone,         // no keyframe
-  kNewView,      // tracks too little of what was seen since the last keyframe
-  kFewInliers,   // about to be lost
-  kTime,         // long since the last one
+  kNone,        // no keyframe
+  kStart,       // one of the two that make a map
+  kNewView,     // tracks too little of what was seen since the last keyframe
+  kFewInliers,  // about to be lost
+  kTime,        // long since the last one
 };
 
 const char* Name(KeyframeReason reason);

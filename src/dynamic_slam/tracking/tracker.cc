@@ -38,9 +38,9 @@ const char* Name(TrackingState state) {
   return "";
 }
 
-Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed, Map* map)
-    : camera_(camera),
-      orb_options_(orb),
+Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
+                 Map* map)
+    : orb_options_(orb),
       options_(options),
       map_(map),
       bounds_(camera.IdealBounds()),
@@ -76,8 +76,9 @@ TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& gre
       frame_.reference = view_.reference;
       frame_.cam_from_reference =
           frame_.cam_from_world * map_->keyframes().At(frame_.reference).cam_from_world().Inverse();
-      velocity_ = last_has_pose_ ? std::optional<Rigid3>(frame_.cam_from_world * last_.cam_from_world.Inverse())
-                                 : std::nullopt;
+      velocity_ = last_has_pose_
+                      ? std::optional<Rigid3>(frame_.cam_from_world * last_.cam_from_world.Inverse())
+                      : std::nullopt;
       if (!start_is_certain_) ReviewStart(&result);
       if (state_ == TrackingState::kTracking && !result.map_was_reset) InsertKeyframeIfDue(&result);
     } else {
@@ -111,28 +112,31 @@ void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) 
   last_keyframe_frame_ = frame_.id;
   most_inliers_ = 0;
   inliers_ = map_->keyframes().At(last_keyframe_).LandmarkCount();
+  result->keyframe_reason = KeyframeReason::kStart;
   result->new_keyframes.clear();
-  map_->keyframes().ForEach([result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
+  map_->keyframes().ForEach(
+      [result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
 }
 
 void Tracker::ReviewStart(TrackingResult* result) {
-  const FrameId reference = initializer_.reference();
-  const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
-  if (initializer_.reference() != reference) {
-    // The first view is out of sight, and nobody knows which motion it was.
-    EmptyMap(result);
-    reason_ = initializer_.reason();
-    return;
+  if (frame_.id.value() - start_frame_.value() < kMaxReviews) {
+    const FrameId reference = initializer_.reference();
+    const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
+    if (initializer_.reference() != reference) {
+      // The first view is out of sight, and nobody knows which motion it was.
+      EmptyMap(result);
+      reason_ = initializer_.reason();
+      return;
+    }
+    if (!proposal.has_value() || !proposal->is_certain) return;
+    // The first keyframe, which nothing moves, is the reference.
+    if (!Agree(frame_.cam_from_world, proposal->structure.last_from_reference)) {
+      EmptyMap(result);
+      StartMap(*proposal, result);
+      reason_ = "another motion fits better: " + initializer_.reason();
+      return;
+    }
   }
-  const bool is_certain = proposal.has_value() && proposal->is_certain;
-  if (is_certain && !Agree(frame_.cam_from_world, proposal->structure.last_from_reference)) {
-    EmptyMap(result);
-    StartMap(*proposal, result);
-    reason_ = "another motion fits better: " + initializer_.reason();
-    return;
-  }
-  const bool is_long_ago = frame_.id.value() - start_frame_.value() >= kMaxReviews;
-  if (!is_certain && !is_long_ago) return;
   start_is_certain_ = true;
   initializer_.Reset();
 }
@@ -145,6 +149,7 @@ void Tracker::EmptyMap(TrackingResult* result) {
   result->map_was_reset = true;
   result->new_keyframes.clear();
   lost_frames_ = 0;
+  inliers_ = 0;
 }
 
 // Local mapping may have moved, merged or erased what the last frame saw, and added to it.
@@ -164,10 +169,12 @@ bool Tracker::TrackFrame() {
   const Rigid3 predicted = velocity_.has_value() ? *velocity_ * last_.cam_from_world : last_.cam_from_world;
   int inliers = pose_tracker_.TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
   if (inliers < options_.min_motion_inliers) {
-    inliers = pose_tracker_.TrackFromFrame(last_, last_.cam_from_world, kWideSearch * options_.motion_radius_px, &frame_);
+    inliers = pose_tracker_.TrackFromFrame(last_, last_.cam_from_world,
+                                           kWideSearch * options_.motion_radius_px, &frame_);
   }
   if (inliers < options_.min_motion_inliers) {
-    reason_ = fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
+    reason_ =
+        fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
     return false;
   }
   return TrackLocalMap(options_.local_map_radius_px, options_.min_inliers);
@@ -193,7 +200,8 @@ bool Tracker::Relocalise() {
   const std::string why_lost = reason_;
   for (size_t i = 0; i < count; ++i) {
     const Keyframe& keyframe = map_->keyframes().At(candidates[candidates.size() - 1 - i]);
-    if (pose_tracker_.TrackFromKeyframe(*map_, keyframe, random_, &frame_) < options_.pnp.min_inliers) continue;
+    if (pose_tracker_.TrackFromKeyframe(*map_, keyframe, random_, &frame_) < options_.pnp.min_inliers)
+      continue;
     if (!TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, options_.min_inliers)) continue;
     // Once more from the better pose, with the narrow window.
     if (TrackLocalMap(options_.local_map_radius_px, options_.min_relocalisation_inliers)) {
@@ -203,8 +211,9 @@ bool Tracker::Relocalise() {
   }
   frame_.ClearLandmarks();
   inliers_ = 0;
-  reason_ = fmt::format("{}; none of {} keyframes matches the image",
-                        why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost, count);
+  reason_ =
+      fmt::format("{}; none of {} keyframes matches the image",
+                  why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost, count);
   return false;
 }
 
@@ -213,7 +222,11 @@ void Tracker::CountVisibility() {
     if (in_view_[i] != 0) ++map_->landmarks().At(view_.ids[i]).visible_count;
   }
   for (const LandmarkId id : frame_.landmarks) {
-    if (id.IsValid()) ++map_->landmarks().At(id).found_count;
+    if (!id.IsValid()) continue;
+    Landmark& landmark = map_->landmarks().At(id);
+    ++landmark.found_count;
+    landmark.visible_count =
+        std::max(landmark.visible_count, landmark.found_count);  // found where not expected
   }
 }
 

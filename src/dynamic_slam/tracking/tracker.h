@@ -22,7 +22,7 @@ namespace dynamic_slam {
 enum class TrackingState {
   kInitialising,  // there is no map yet
   kTracking,
-  kLost,          // there is a map, and no pose in it
+  kLost,  // there is a map, and no pose in it
 };
 
 const char* Name(TrackingState state);
@@ -32,19 +32,21 @@ struct TrackingResult {
   TrackingState state = TrackingState::kInitialising;
   std::string reason;  // one sentence with its number; empty while all is well
   int keypoints = 0;
-  int inliers = 0;     // landmarks that fit the pose
+  int inliers = 0;  // landmarks that fit the pose
   KeyframeReason keyframe_reason = KeyframeReason::kNone;
   std::vector<KeyframeId> new_keyframes;  // inserted into the map, waiting for local mapping
   bool map_was_reset = false;
 };
 
-// From images to poses: a state machine over initialisation, tracking and being lost. Synchronous; the map belongs to
-// it during Track().
+// From images to poses: a state machine over initialisation, tracking and being lost. Synchronous; the map
+// belongs to it during Track().
 class Tracker {
  public:
-  Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed, Map* map);
+  Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
+          Map* map);
 
-  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden (Eq. 11).
+  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden (Eq.
+  // 11).
   TrackingResult Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask);
 
   // The frame of the last Track(); its pose holds when the state is kTracking.
@@ -64,7 +66,6 @@ class Tracker {
   void InsertKeyframeIfDue(TrackingResult* result);
   void GiveUpSmallMap(TrackingResult* result);
 
-  Camera camera_;
   OrbOptions orb_options_;
   TrackerOptions options_;
   Map* map_;
