@@ -67,8 +67,9 @@ void RunConsole::End() {
 }
 
 void PrintSummary(const RunSummary& summary) {
-  fmt::print("{} of {} frames have a pose ({:.1f}%), {} keyframes, {} landmarks\n", summary.frames_tracked,
-             summary.frames_total, 100.0 * summary.Coverage(), summary.keyframes, summary.landmarks);
+  fmt::print("{} of {} frames tracked ({:.1f}%), {} more have a pose, {} keyframes, {} landmarks\n",
+             summary.frames_tracked, summary.frames_total, 100.0 * summary.Coverage(),
+             summary.frames_backfilled, summary.keyframes, summary.landmarks);
   if (summary.interrupted) fmt::print("interrupted: these are the results up to then\n");
   if (summary.initialised_at.has_value()) {
     fmt::print("initialised at frame {}, lost {} times\n", *summary.initialised_at, summary.lost_count);

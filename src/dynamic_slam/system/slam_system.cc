@@ -44,10 +44,8 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const c
   }
   if (result.tracking.state == TrackingState::kTracking) {
     const Frame& frame = tracker_.frame();
-    if (result.tracking.new_keyframes.size() == 2) {
-      // The first view had to wait for the second.
-      const Keyframe& first = map_.keyframes().At(result.tracking.new_keyframes.front());
-      tracked_.push_back({first.timestamp_s(), first.id(), Rigid3(), false});
+    for (const EarlierFrame& earlier : result.tracking.earlier_frames) {
+      tracked_.push_back({earlier.timestamp_s, earlier.reference, earlier.cam_from_reference, false});
     }
     tracked_.push_back({timestamp_s, frame.reference, frame.cam_from_reference, true});
   }

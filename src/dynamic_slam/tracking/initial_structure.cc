@@ -28,7 +28,8 @@ BundleProblem::Observation MakeObservation(uint32_t pose, uint32_t point, const 
 }  // namespace
 
 double InitialStructure::MeanCost() const {
-  return std::accumulate(costs.begin(), costs.end(), 0.0) / static_cast<double>(std::max<size_t>(costs.size(), 1));
+  return std::accumulate(costs.begin(), costs.end(), 0.0) /
+         static_cast<double>(std::max<size_t>(costs.size(), 1));
 }
 
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views) {
@@ -36,14 +37,15 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
   BundleProblem problem;
   problem.poses = {{Rigid3(), true}, {motion.second_from_first, false}};
   std::vector<uint32_t> point_of_keypoint(views.reference.size(), kNone);
-  for (uint32_t i = 0; i < views.last.size(); ++i) {
-    const Sighting& in_reference = views.reference[views.last[i].reference_keypoint];
+  for (uint32_t i = 0; i < views.last.sightings.size(); ++i) {
+    const Sighting& in_reference = views.reference[views.last.sightings[i].reference_keypoint];
     point_of_keypoint[in_reference.reference_keypoint] = i;
-    // What two views cannot place starts far away: motions can be compared only when each has to explain every match.
+    // What two views cannot place starts far away: motions can be compared only when each has to explain
+    // every match.
     const Eigen::Vector3d far = kFarBaselines * camera.Unproject(in_reference.ideal_px);
     problem.points.push_back({motion.is_inlier[i] != 0 ? motion.points_in_first[i] : far, false});
     problem.observations.push_back(MakeObservation(0, i, in_reference));
-    problem.observations.push_back(MakeObservation(1, i, views.last[i]));
+    problem.observations.push_back(MakeObservation(1, i, views.last.sightings[i]));
   }
 
   // The views between start from their neighbour's pose, backwards from the last one.
@@ -51,19 +53,21 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
   PoseObservations observations;
   PoseEstimate estimate;
   Rigid3 neighbour = motion.second_from_first;
+  std::vector<uint8_t> has_pose(views.between.size(), 0);
   for (size_t v = views.between.size(); v-- > 0;) {
     observations.Clear();
-    for (const Sighting& sighting : views.between[v]) {
+    for (const Sighting& sighting : views.between[v].sightings) {
       const uint32_t point = point_of_keypoint[sighting.reference_keypoint];
       if (point == kNone) continue;
       observations.Add(problem.points[point].position, sighting.ideal_px, 1.0 / sighting.sigma_px);
     }
     optimizer.Optimize(observations, neighbour, &estimate);
-    if (estimate.converged && estimate.inliers >= kMinSightings) neighbour = estimate.cam_from_world;
+    has_pose[v] = estimate.converged && estimate.inliers >= kMinSightings;
+    if (has_pose[v] != 0) neighbour = estimate.cam_from_world;
     // A view that fits badly stays: its cost tells against the motion.
     const uint32_t pose = static_cast<uint32_t>(problem.poses.size());
     problem.poses.push_back({neighbour, false});
-    for (const Sighting& sighting : views.between[v]) {
+    for (const Sighting& sighting : views.between[v].sightings) {
       const uint32_t point = point_of_keypoint[sighting.reference_keypoint];
       if (point != kNone) problem.observations.push_back(MakeObservation(pose, point, sighting));
     }
@@ -75,7 +79,13 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
   std::vector<uint8_t> is_outlier;
   structure.usable = AdjustBundle(camera, options, {}, &problem, &is_outlier).usable;
   structure.last_from_reference = problem.poses[1].cam_from_world;
-  structure.costs.assign(views.last.size(), 0);
+  structure.between_from_reference.resize(views.between.size());
+  for (size_t v = 0; v < views.between.size(); ++v) {
+    // The problem has them backwards, after the outer two.
+    if (has_pose[v] != 0)
+      structure.between_from_reference[v] = problem.poses[1 + views.between.size() - v].cam_from_world;
+  }
+  structure.costs.assign(views.last.sightings.size(), 0);
   for (const BundleProblem::Observation& observation : problem.observations) {
     const Eigen::Vector3d x_in_cam =
         problem.poses[observation.pose].cam_from_world * problem.points[observation.point].position;
@@ -87,7 +97,7 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
     structure.costs[observation.point] += std::min(cost, kChi2TwoDof);
   }
   const Eigen::Vector3d last_center = structure.last_from_reference.TargetOriginInSource();
-  for (size_t i = 0; i < views.last.size(); ++i) {
+  for (size_t i = 0; i < views.last.sightings.size(); ++i) {
     const Eigen::Vector3d& point = problem.points[i].position;
     structure.points_in_reference.push_back(point);
     const bool is_good = is_outlier[2 * i] == 0 && is_outlier[2 * i + 1] == 0 &&

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <span>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,22 +18,29 @@ struct Sighting {
   double sigma_px = 1;  // scale of its octave
 };
 
-// The views of which the first map is made: the reference at the origin, the last one, whose matches gave the motion,
-// and some between. One reference keypoint has at most one sighting in each.
+// What one image sees of the reference view. One reference keypoint has at most one sighting.
+struct InitialView {
+  double timestamp_s = 0;
+  std::vector<Sighting> sightings;
+};
+
+// The views of which the first map is made: the reference at the origin, the last one, whose matches gave the
+// motion, and some between.
 struct InitialViews {
-  std::vector<Sighting> reference;             // all its keypoints: entry i is keypoint i
-  std::vector<std::vector<Sighting>> between;  // in the order of time
-  std::vector<Sighting> last;                  // one for each match
+  std::vector<Sighting> reference;   // all its keypoints: entry i is keypoint i
+  std::vector<InitialView> between;  // in the order of time
+  InitialView last;                  // one sighting for each match
 };
 
 // A two-view motion after bundle adjustment over all views.
 struct InitialStructure {
   bool usable = false;
   Rigid3 last_from_reference;
-  std::vector<Eigen::Vector3d> points_in_reference;  // per match
-  std::vector<uint8_t> is_good;                      // per match: in front of and near its sighting in both outer views
-  std::vector<double> costs;                         // per match: squared errors of all its sightings, in sigmas, each cut
-                                                     // off at the outlier limit
+  std::vector<std::optional<Rigid3>> between_from_reference;  // none where too little fits
+  std::vector<Eigen::Vector3d> points_in_reference;           // per match
+  std::vector<uint8_t> is_good;  // per match: in front of and near its sighting in both outer views
+  std::vector<double> costs;     // per match: squared errors of all its sightings, in sigmas, each cut
+                                 // off at the outlier limit
   int points = 0;
 
   double MeanCost() const;
@@ -41,8 +48,9 @@ struct InitialStructure {
 
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views);
 
-// How sure it is that `a` fits the views better than `b`: the mean difference of their costs over matches, in standard
-// errors of that mean. A scene close to a plane allows two motions between two views, but not between three.
+// How sure it is that `a` fits the views better than `b`: the mean difference of their costs over matches, in
+// standard errors of that mean. A scene close to a plane allows two motions between two views, but not
+// between three.
 double Preference(const InitialStructure& a, const InitialStructure& b);
 
 }  // namespace dynamic_slam

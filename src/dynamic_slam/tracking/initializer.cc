@@ -104,7 +104,7 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
   }
   AddView(frame, matches);
   std::vector<Eigen::Vector2d> first_px, second_px;
-  for (const Sighting& sighting : views_.last) {
+  for (const Sighting& sighting : views_.last.sightings) {
     first_px.push_back(views_.reference[sighting.reference_keypoint].ideal_px);
     second_px.push_back(sighting.ideal_px);
   }
@@ -123,17 +123,17 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
 }
 
 void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches) {
-  if (!views_.last.empty()) views_.between.push_back(std::move(views_.last));
+  if (!views_.last.sightings.empty()) views_.between.push_back(std::move(views_.last));
   // Of too many views every second one is enough.
   if (views_.between.size() > kMaxViewsBetween) {
     for (size_t i = 0; 2 * i + 1 < views_.between.size(); ++i)
       views_.between[i] = std::move(views_.between[2 * i + 1]);
     views_.between.resize(views_.between.size() / 2);
   }
-  views_.last.clear();
+  views_.last = {frame.timestamp_s, {}};
   for (const Match& match : matches) {
     const Keypoint& keypoint = frame.features.keypoints[match.second];
-    views_.last.push_back({match.first, {keypoint.x, keypoint.y}, ScaleOf(keypoint)});
+    views_.last.sightings.push_back({match.first, {keypoint.x, keypoint.y}, ScaleOf(keypoint)});
   }
 }
 
@@ -173,7 +173,7 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
   return InitialProposal{std::move(best), {}, is_certain};
 }
 
-void Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
+std::vector<EarlierFrame> Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
   const InitialStructure& structure = proposal.structure;
   const std::vector<Match>& matches = proposal.matches;
   std::vector<double> depths;
@@ -203,6 +203,15 @@ void Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* m
   }
   frame->reference = second_id;
   frame->cam_from_reference = Rigid3();
+
+  std::vector<EarlierFrame> earlier{{reference_->timestamp_s, first_id, Rigid3()}};
+  for (size_t i = 0; i < views_.between.size(); ++i) {
+    if (!structure.between_from_reference[i].has_value()) continue;
+    Rigid3 pose = *structure.between_from_reference[i];
+    pose.translation *= scale;
+    earlier.push_back({views_.between[i].timestamp_s, first_id, pose});
+  }
+  return earlier;
 }
 
 }  // namespace dynamic_slam

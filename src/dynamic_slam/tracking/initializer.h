@@ -15,6 +15,13 @@
 
 namespace dynamic_slam {
 
+// A frame that gets its pose when a later one makes the map.
+struct EarlierFrame {
+  double timestamp_s = 0;
+  KeyframeId reference;
+  Rigid3 cam_from_reference;
+};
+
 // Two views of which a first map can be made.
 struct InitialProposal {
   InitialStructure structure;
@@ -35,7 +42,8 @@ class Initializer {
 
   // Gives the map, which must be empty, two keyframes and their landmarks (median depth 1 in the first), and
   // the frame, which is the one of the proposal, its pose, landmarks and reference.
-  void BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
+  // The frames before it that have a pose now, in the order of time.
+  std::vector<EarlierFrame> BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
 
   // The frame with which all are matched; not valid before the first.
   FrameId reference() const { return reference_.has_value() ? reference_->id : FrameId(); }

@@ -23,7 +23,7 @@ class InitializerTest : public ::testing::Test {
   bool Start(Frame* frame) {
     const std::optional<InitialProposal> proposal = initializer_.Propose(*frame, random_);
     if (!proposal.has_value() || !proposal->is_certain) return false;
-    initializer_.BuildMap(*proposal, frame, &map_);
+    earlier_ = initializer_.BuildMap(*proposal, frame, &map_);
     return true;
   }
 
@@ -32,6 +32,7 @@ class InitializerTest : public ::testing::Test {
   Random random_{1};
   Map map_{SyntheticWorld::OctaveScales()};
   std::vector<SyntheticView> views_;
+  std::vector<EarlierFrame> earlier_;
 };
 
 TEST_F(InitializerTest, MakesAMapThatIsTrueUpToScale) {
@@ -52,6 +53,11 @@ TEST_F(InitializerTest, MakesAMapThatIsTrueUpToScale) {
   const double m_per_unit = x / map_.keyframes().At(KeyframeId(1)).CenterInWorld().norm();
   EXPECT_LT((m_per_unit * frame.cam_from_world.translation - Eigen::Vector3d(-x, 0, 0)).norm(), 0.05 * x);
   EXPECT_LT(RotationAngle(frame.cam_from_world.rotation, Eigen::Quaterniond::Identity()), 0.005);
+  ASSERT_GE(earlier_.size(), 2u) << "the first view, and those between";
+  for (size_t i = 0; i < earlier_.size(); ++i) {
+    EXPECT_LE((m_per_unit * earlier_[i].cam_from_reference.translation).norm(), x);
+    EXPECT_LT((m_per_unit * earlier_[i].cam_from_reference.translation).tail<2>().norm(), 0.05 * x);
+  }
   std::vector<double> errors;
   map_.landmarks().ForEach([&](const Landmark& landmark) {
     const Eigen::Vector3d& truth =

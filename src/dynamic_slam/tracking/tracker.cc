@@ -101,7 +101,7 @@ void Tracker::Initialise(TrackingResult* result) {
 }
 
 void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) {
-  initializer_.BuildMap(proposal, &frame_, map_);
+  result->earlier_frames = initializer_.BuildMap(proposal, &frame_, map_);
   start_is_certain_ = proposal.is_certain;
   if (start_is_certain_) initializer_.Reset();
   state_ = TrackingState::kTracking;

@@ -34,7 +34,8 @@ struct TrackingResult {
   int keypoints = 0;
   int inliers = 0;  // landmarks that fit the pose
   KeyframeReason keyframe_reason = KeyframeReason::kNone;
-  std::vector<KeyframeId> new_keyframes;  // inserted into the map, waiting for local mapping
+  std::vector<KeyframeId> new_keyframes;     // inserted into the map, waiting for local mapping
+  std::vector<EarlierFrame> earlier_frames;  // that have a pose since the map was made
   bool map_was_reset = false;
 };
 
