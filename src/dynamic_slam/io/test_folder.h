@@ -6,6 +6,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
@@ -18,7 +19,8 @@ class FolderTest : public ::testing::Test {
   FolderTest() {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
     folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("dynamic_slam_") + test->test_suite_name() + "_" + test->name());
+              (std::string("dynamic_slam_") + std::to_string(getpid()) + "_" + test->test_suite_name() + "_" +
+               test->name());
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
