@@ -1,10 +1,16 @@
 #pragma once
 
-// DS_DISPATCH_POPCNT before a function compiles it twice, with and without the processor's bit count, and picks at run
-// time. The results are the same. Sanitizers start after the pick, so they get the plain version.
+// Before a function, these compile it twice, plain and for a later x86-64 processor; the machine picks one when it loads
+// the program. Both give the same bits: use them for integer loops only. Sanitizers are not ready when the choice is
+// made, so they get the plain version.
+//
+//   DS_DISPATCH_AVX2    wide integer loops
+//   DS_DISPATCH_POPCNT  counting bits, which the plain version does by a call
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
-#define DS_DISPATCH_POPCNT __attribute__((target_clones("popcnt", "default")))
+#define DS_DISPATCH_AVX2 __attribute__((target_clones("default", "avx2")))
+#define DS_DISPATCH_POPCNT __attribute__((target_clones("default", "popcnt")))
 #else
+#define DS_DISPATCH_AVX2
 #define DS_DISPATCH_POPCNT
 #endif

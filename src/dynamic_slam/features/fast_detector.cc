@@ -5,8 +5,8 @@
 #include <bit>
 #include <cstring>
 
+#include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/base/error.h"
-#include "dynamic_slam/features/multiversion.h"
 
 namespace dynamic_slam {
 namespace {
@@ -15,7 +15,7 @@ inline uint8_t Min(uint8_t a, uint8_t b) { return a < b ? a : b; }
 inline uint8_t Max(uint8_t a, uint8_t b) { return a > b ? a : b; }
 
 // score[x] for x in [begin, end) of the row at `centre`.
-DS_MULTIVERSION
+DS_DISPATCH_AVX2
 void ScoreRow(const uint8_t* __restrict centre, ptrdiff_t stride, int begin, int end,
               uint8_t* __restrict score) {
   const uint8_t *u3 = centre - 3 * stride, *u2 = centre - 2 * stride, *u1 = centre - stride;  // rows above
@@ -56,7 +56,7 @@ void ScoreRow(const uint8_t* __restrict centre, ptrdiff_t stride, int begin, int
 }
 
 // marks[x] = 255 where the score of the middle row is above the threshold and a local maximum, else 0.
-DS_MULTIVERSION
+DS_DISPATCH_AVX2
 void MarkMaxima(const uint8_t* __restrict above, const uint8_t* __restrict middle,
                 const uint8_t* __restrict below, int begin, int end, uint8_t threshold,
                 uint8_t* __restrict marks) {

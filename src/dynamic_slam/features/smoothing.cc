@@ -1,7 +1,7 @@
 #include "dynamic_slam/features/smoothing.h"
 
+#include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/base/error.h"
-#include "dynamic_slam/features/multiversion.h"
 
 namespace dynamic_slam {
 namespace {
@@ -12,7 +12,7 @@ inline uint8_t Average(uint8_t a, uint8_t b) { return static_cast<uint8_t>((a + 
 using Filter = void (*)(const uint8_t* a, const uint8_t* b, const uint8_t* c, const uint8_t* d,
                         const uint8_t* e, int count, uint8_t* out);
 
-DS_MULTIVERSION
+DS_DISPATCH_AVX2
 void Fine(const uint8_t* a, const uint8_t* b, const uint8_t* c, const uint8_t* d, const uint8_t* e, int count,
           uint8_t* __restrict out) {
   for (int x = 0; x < count; ++x) {
@@ -24,7 +24,7 @@ void Fine(const uint8_t* a, const uint8_t* b, const uint8_t* c, const uint8_t* d
   }
 }
 
-DS_MULTIVERSION
+DS_DISPATCH_AVX2
 void Coarse(const uint8_t* a, const uint8_t*, const uint8_t* c, const uint8_t*, const uint8_t* e, int count,
             uint8_t* __restrict out) {
   for (int x = 0; x < count; ++x) out[x] = Average(Average(a[x], e[x]), c[x]);

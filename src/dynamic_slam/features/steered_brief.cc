@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "dynamic_slam/features/multiversion.h"
+#include "dynamic_slam/base/dispatch.h"
 
 namespace dynamic_slam {
 namespace {
@@ -32,7 +32,7 @@ constexpr CircleWeights MakeCircleWeights() {
 constexpr CircleWeights kCircle = MakeCircleWeights();
 
 // First moments of the patch whose top left pixel is given.
-DS_MULTIVERSION
+DS_DISPATCH_AVX2
 void Moments(const uint8_t* __restrict patch, ptrdiff_t stride, int* moment_x, int* moment_y) {
   int sum_x = 0, sum_y = 0;
   for (int row = 0; row <= 2 * kPatchRadius; ++row, patch += stride) {
