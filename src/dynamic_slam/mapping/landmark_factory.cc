@@ -5,14 +5,11 @@
 
 #include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/features/matcher.h"
+#include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/geometry/triangulation.h"
 
 namespace dynamic_slam {
 namespace {
-
-// 95% quantiles of chi-squared with one and two degrees of freedom.
-constexpr double kChi2OneDof = 3.841;
-constexpr double kChi2TwoDof = 5.991;
 
 // Nearest over second nearest distance along the line.
 constexpr double kEpipolarRatio = 0.9;
@@ -47,16 +44,16 @@ FreeKeypoints CollectFree(const Keyframe& keyframe, const std::vector<float>& sc
   return free;
 }
 
-// The part of an epipolar line a x + b y + c = 0 (a^2 + b^2 = 1) on which a point can lie: `from` is where the nearest
-// depth projects to, `along` the direction to where infinity does, `length` the distance between.
+// The part of an epipolar line a x + b y + c = 0 (a^2 + b^2 = 1) on which a point can lie: `from` is where
+// the nearest depth projects to, `along` the direction to where infinity does, `length` the distance between.
 struct EpipolarSegment {
   float a, b, c;
   float from_x, from_y, along_x, along_y, length;
 };
 
 DS_DISPATCH_POPCNT
-uint32_t FindOnSegment(const FreeKeypoints& candidates, const EpipolarSegment& segment, const Descriptor& descriptor,
-                       int octave) {
+uint32_t FindOnSegment(const FreeKeypoints& candidates, const EpipolarSegment& segment,
+                       const Descriptor& descriptor, int octave) {
   int best_distance = kStrictDistance + 1, second_distance = 257;
   float best_along = 0;
   uint32_t best = WindowMatch::kNone;
@@ -104,8 +101,9 @@ std::vector<LandmarkId> LandmarkFactory::Create(KeyframeId id, Map* map) const {
   return created;
 }
 
-void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyframe& neighbour, double median_depth,
-                                          Map* map, std::vector<LandmarkId>* created) const {
+void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyframe& neighbour,
+                                          double median_depth, Map* map,
+                                          std::vector<LandmarkId>* created) const {
   const std::vector<float>& scales = map->octave_scales();
   const Rigid3 neighbour_from_keyframe = neighbour.cam_from_world() * keyframe.cam_from_world().Inverse();
   const Eigen::Matrix3d rotation = neighbour_from_keyframe.Matrix();
@@ -123,7 +121,8 @@ void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyfra
   const FreeKeypoints theirs = CollectFree(neighbour, scales);
   for (size_t i = 0; i < mine.indices.size(); ++i) {
     const Eigen::Vector3d ray = camera_.Unproject({mine.x[i], mine.y[i]});
-    const Eigen::Vector3d near = rotation * (kNearestDepthRatio * median_depth * ray) + neighbour_from_keyframe.translation;
+    const Eigen::Vector3d near =
+        rotation * (kNearestDepthRatio * median_depth * ray) + neighbour_from_keyframe.translation;
     const Eigen::Vector3d far = rotation * ray;
     if (near.z() <= 0 || far.z() <= 0) continue;
     const Eigen::Vector2d near_px = camera_.Project(near), far_px = camera_.Project(far);
@@ -142,7 +141,8 @@ void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyfra
     const uint32_t j = FindOnSegment(theirs, segment, mine.descriptors[i], mine.octaves[i]);
     if (j == WindowMatch::kNone) continue;
     found.push_back({mine.indices[i], theirs.indices[j]});
-    consistency.Add(keyframe.keypoint(mine.indices[i]).angle_rad, neighbour.keypoint(theirs.indices[j]).angle_rad);
+    consistency.Add(keyframe.keypoint(mine.indices[i]).angle_rad,
+                    neighbour.keypoint(theirs.indices[j]).angle_rad);
   }
 
   const std::vector<uint8_t>& keep = consistency.Judge();
@@ -159,14 +159,17 @@ void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyfra
     const double first_scale = scales[static_cast<size_t>(first.octave)];
     const double second_scale = scales[static_cast<size_t>(second.octave)];
     const Eigen::Vector3d x_in_neighbour = neighbour_from_keyframe * *x_in_keyframe;
-    const double first_error = (camera_.Project(*x_in_keyframe) - Eigen::Vector2d(first.x, first.y)).squaredNorm();
-    const double second_error = (camera_.Project(x_in_neighbour) - Eigen::Vector2d(second.x, second.y)).squaredNorm();
+    const double first_error =
+        (camera_.Project(*x_in_keyframe) - Eigen::Vector2d(first.x, first.y)).squaredNorm();
+    const double second_error =
+        (camera_.Project(x_in_neighbour) - Eigen::Vector2d(second.x, second.y)).squaredNorm();
     if (first_error > kChi2TwoDof * first_scale * first_scale) continue;
     if (second_error > kChi2TwoDof * second_scale * second_scale) continue;
     // The octaves must tell the same ratio of distances as the geometry.
     const double distance_ratio = x_in_neighbour.norm() / x_in_keyframe->norm();
     const double octave_ratio = first_scale / second_scale;
-    if (distance_ratio > octave_ratio * max_scale_ratio || distance_ratio * max_scale_ratio < octave_ratio) continue;
+    if (distance_ratio > octave_ratio * max_scale_ratio || distance_ratio * max_scale_ratio < octave_ratio)
+      continue;
 
     const LandmarkId id = map->AddLandmark(world_from_keyframe * *x_in_keyframe, keyframe.id()).id();
     map->Link(keyframe.id(), found[k].first, id);

@@ -8,7 +8,8 @@
 
 namespace dynamic_slam {
 
-// Makes landmarks from keypoints of a keyframe and its neighbours that have none yet, by search along epipolar lines.
+// Makes landmarks from keypoints of a keyframe and its neighbours that have none yet, by search along
+// epipolar lines.
 class LandmarkFactory {
  public:
   LandmarkFactory(const Camera& camera, const MapperOptions& options);

@@ -3,16 +3,16 @@
 #include <vector>
 
 #include "dynamic_slam/features/matcher.h"
+#include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/map/landmark_projector.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr double kRadiusPx = 3.0;
-constexpr double kChi2TwoDof = 5.991;
 
-void FuseInto(const std::vector<LandmarkId>& landmarks, const Keyframe& target, LandmarkProjector* projector, Map* map,
-              FusionCount* count) {
+void FuseInto(const std::vector<LandmarkId>& landmarks, const Keyframe& target, LandmarkProjector* projector,
+              Map* map, FusionCount* count) {
   projector->SetPose(target.cam_from_world());
   for (const LandmarkId candidate : landmarks) {
     const Landmark* landmark = map->landmarks().Find(candidate);  // may have been merged a moment ago
@@ -24,12 +24,15 @@ void FuseInto(const std::vector<LandmarkId>& landmarks, const Keyframe& target, 
     }
     const double scale = map->octave_scales()[static_cast<size_t>(projection.octave)];
     const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
-                              static_cast<float>(kRadiusPx * scale), projection.octave - 1, projection.octave + 1};
-    const WindowMatch match = FindInWindow(target.features(), target.grid(), window, landmark->descriptor(), {});
+                              static_cast<float>(kRadiusPx * scale), projection.octave - 1,
+                              projection.octave + 1};
+    const WindowMatch match =
+        FindInWindow(target.features(), target.grid(), window, landmark->descriptor(), {});
     if (match.distance > kStrictDistance) continue;
     const Keypoint& keypoint = target.keypoint(match.keypoint);
     const double sigma = map->octave_scales()[static_cast<size_t>(keypoint.octave)];
-    if ((Eigen::Vector2d(keypoint.x, keypoint.y) - projection.px).squaredNorm() > kChi2TwoDof * sigma * sigma) continue;
+    if ((Eigen::Vector2d(keypoint.x, keypoint.y) - projection.px).squaredNorm() > kChi2TwoDof * sigma * sigma)
+      continue;
 
     const LandmarkId present = target.landmarks()[match.keypoint];
     if (!present.IsValid()) {

@@ -11,7 +11,8 @@ struct FusionCount {
   int merged = 0;  // pairs of landmarks that were one
 };
 
-// Projects the keyframe's landmarks into its neighbours and theirs into it; links what is found, merges what is twice.
+// Projects the keyframe's landmarks into its neighbours and theirs into it; links what is found, merges what
+// is twice.
 FusionCount FuseLandmarks(const Camera& camera, const MapperOptions& options, KeyframeId keyframe, Map* map);
 
 }  // namespace dynamic_slam

@@ -6,8 +6,9 @@
 namespace dynamic_slam {
 namespace {
 
-// A new landmark is on probation for so many keyframes: tracking must find it in a quarter of the frames where it
-// should be visible, and after two keyframes a third must have seen it (Mur-Artal et al. 2015, section VI-B).
+// A new landmark is on probation for so many keyframes: tracking must find it in a quarter of the frames
+// where it should be visible, and after two keyframes a third must have seen it (Mur-Artal et al. 2015,
+// section VI-B).
 constexpr uint32_t kProbationKeyframes = 3;
 constexpr double kMinFoundRatio = 0.25;
 constexpr size_t kMinObservations = 3;
@@ -27,13 +28,13 @@ MappingResult LocalMapper::Process(KeyframeId keyframe) {
   recent_landmarks_.insert(recent_landmarks_.end(), created.begin(), created.end());
   result.created = static_cast<int>(created.size());
   result.merged_landmarks = FuseLandmarks(camera_, options_, keyframe, map_).merged;
-  if (map_->keyframes().size() >= 2) result.bundle = AdjustLocal(camera_, options_, keyframe, {}, map_);
+  if (map_->keyframes().size() >= 2) result.bundle = AdjustLocal(camera_, options_, keyframe, map_);
   result.culled_keyframes = CullRedundantKeyframes(keyframe);
   return result;
 }
 
 BundleSummary LocalMapper::Finish() {
-  return map_->keyframes().size() < 2 ? BundleSummary() : AdjustAll(camera_, options_, {}, map_);
+  return map_->keyframes().size() < 2 ? BundleSummary() : AdjustAll(camera_, options_, map_);
 }
 
 int LocalMapper::CullRecentLandmarks(KeyframeId current) {
@@ -69,7 +70,8 @@ int LocalMapper::CullRedundantKeyframes(KeyframeId current) {
       int views = 0;
       for (const Observation& other : map_->landmarks().At(keyframe.landmarks()[i]).observations()) {
         if (other.keyframe == keyframe.id()) continue;
-        views += map_->keyframes().At(other.keyframe).keypoint(other.keypoint).octave <= keyframe.keypoint(i).octave + 1;
+        views += map_->keyframes().At(other.keyframe).keypoint(other.keypoint).octave <=
+                 keyframe.keypoint(i).octave + 1;
       }
       redundant += views >= kRedundantViews;
     }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "dynamic_slam/geometry/camera.h"
@@ -11,15 +10,15 @@
 namespace dynamic_slam {
 
 struct MappingResult {
-  int created = 0;           // landmarks
+  int created = 0;  // landmarks
   int culled_landmarks = 0;
   int merged_landmarks = 0;
   int culled_keyframes = 0;
   BundleSummary bundle;
 };
 
-// What happens to the map about a new keyframe: doubtful landmarks go, new ones come, duplicates are fused, poses and
-// points are adjusted, redundant keyframes go. Synchronous.
+// What happens to the map about a new keyframe: doubtful landmarks go, new ones come, duplicates are fused,
+// poses and points are adjusted, redundant keyframes go. Synchronous.
 class LocalMapper {
  public:
   LocalMapper(const Camera& camera, const MapperOptions& options, Map* map);

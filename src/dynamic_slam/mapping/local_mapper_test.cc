@@ -154,7 +154,7 @@ TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
     pose.translation += 0.02 * Eigen::Vector3d(random.Gaussian(), random.Gaussian(), random.Gaussian());
     scene.map.keyframes().At(ids[i]).set_cam_from_world(pose);
   }
-  const BundleSummary summary = AdjustAll(world.camera(), {}, {}, &scene.map);
+  const BundleSummary summary = AdjustAll(world.camera(), {}, &scene.map);
   EXPECT_TRUE(summary.usable);
   EXPECT_FALSE(scene.map.keyframes().At(ids[2]).landmarks()[free].IsValid());
   // The scale is free: compare the shape of the path.

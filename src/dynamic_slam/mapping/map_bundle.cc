@@ -33,8 +33,7 @@ class MapBundle {
   }
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
-  BundleSummary Solve(const Camera& camera, const BundleOptions& options,
-                      const std::function<bool()>& should_stop) {
+  BundleSummary Solve(const Camera& camera, const BundleOptions& options) {
     for (const LandmarkId id : landmarks_) {
       const Landmark& landmark = map_->landmarks().At(id);
       const uint32_t point = static_cast<uint32_t>(problem_.points.size());
@@ -51,7 +50,7 @@ class MapBundle {
       }
     }
     std::vector<uint8_t> is_outlier;
-    const BundleSummary summary = AdjustBundle(camera, options, should_stop, &problem_, &is_outlier);
+    const BundleSummary summary = AdjustBundle(camera, options, {}, &problem_, &is_outlier);
     if (summary.usable) WriteBack(is_outlier);
     return summary;
   }
@@ -88,8 +87,7 @@ class MapBundle {
 
 }  // namespace
 
-BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId id,
-                          const std::function<bool()>& should_stop, Map* map) {
+BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId id, Map* map) {
   std::vector<KeyframeId> local{id};
   for (const CovisibleKeyframe& other :
        map->keyframes().At(id).BestCovisible(static_cast<size_t>(options.local_keyframes - 1))) {
@@ -121,11 +119,10 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
   const bool oldest_is_fixed = oldest == KeyframeId(0) || fixed.size() < 2;
   for (const KeyframeId keyframe : local) bundle.AddPose(keyframe, oldest_is_fixed && keyframe == oldest);
   for (const KeyframeId keyframe : fixed) bundle.AddPose(keyframe, true);
-  return bundle.Solve(camera, options.local_bundle, should_stop);
+  return bundle.Solve(camera, options.local_bundle);
 }
 
-BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
-                        const std::function<bool()>& should_stop, Map* map) {
+BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, Map* map) {
   MapBundle bundle(map);
   bool first = true;
   map->keyframes().ForEach([&](const Keyframe& keyframe) {
@@ -133,7 +130,7 @@ BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
     bundle.AddLandmarksOf(keyframe.id());
     first = false;
   });
-  return bundle.Solve(camera, options.final_bundle, should_stop);
+  return bundle.Solve(camera, options.final_bundle);
 }
 
 }  // namespace dynamic_slam

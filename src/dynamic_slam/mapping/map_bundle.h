@@ -1,7 +1,5 @@
 #pragma once
 
-#include <functional>
-
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/map.h"
 #include "dynamic_slam/mapping/mapper_options.h"
@@ -9,13 +7,11 @@
 
 namespace dynamic_slam {
 
-// Bundle adjustment of the keyframe, its best neighbours and all they see; others that see it too stay fixed. Links
-// that do not fit are broken.
-BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
-                          const std::function<bool()>& should_stop, Map* map);
+// Bundle adjustment of the keyframe, its best neighbours and all they see; others that see it too stay fixed.
+// Links that do not fit are broken.
+BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe, Map* map);
 
 // The same of the whole map, the oldest keyframe fixed.
-BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, const std::function<bool()>& should_stop,
-                        Map* map);
+BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, Map* map);
 
 }  // namespace dynamic_slam

@@ -20,19 +20,25 @@ struct MapperOptions {
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("triangulation_neighbours", self.triangulation_neighbours,
           OptionField{"", 1, 200, "Neighbours of a new keyframe with which new landmarks are triangulated."});
-    visit("min_baseline_ratio", self.min_baseline_ratio,
-          OptionField{"", 0, 1, "Distance to such a neighbour over the median depth of the scene, at least."});
+    visit(
+        "min_baseline_ratio", self.min_baseline_ratio,
+        OptionField{"", 0, 1, "Distance to such a neighbour over the median depth of the scene, at least."});
     visit("min_parallax_deg", self.min_parallax_deg,
-          OptionField{"deg", 0, 45, "Parallax that a new landmark needs; with less its depth is biased, and the scale drifts."});
+          OptionField{
+              "deg", 0, 45,
+              "Parallax that a new landmark needs; with less its depth is biased, and the scale drifts."});
     visit("fusion_neighbours", self.fusion_neighbours,
           OptionField{"", 1, 200, "Neighbours with which duplicate landmarks are fused."});
     visit("local_keyframes", self.local_keyframes,
           OptionField{"", 1, 500, "Keyframes that local bundle adjustment moves."});
-    visit("fixed_keyframes", self.fixed_keyframes,
-          OptionField{"", 1, 500, "Keyframes that hold the local ones in place, those that see most of their landmarks."});
-    visit("redundant_ratio", self.redundant_ratio,
-          OptionField{"", 0.1, 1,
-                      "A keyframe is culled when this part of its landmarks is seen as well by three others."});
+    visit(
+        "fixed_keyframes", self.fixed_keyframes,
+        OptionField{"", 1, 500,
+                    "Keyframes that hold the local ones in place, those that see most of their landmarks."});
+    visit(
+        "redundant_ratio", self.redundant_ratio,
+        OptionField{"", 0.1, 1,
+                    "A keyframe is culled when this part of its landmarks is seen as well by three others."});
     visit("local_bundle", self.local_bundle);
     visit("final_bundle", self.final_bundle);
   }

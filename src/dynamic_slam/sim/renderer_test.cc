@@ -4,25 +4,13 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/sim/room.h"
 
 namespace dynamic_slam {
 namespace {
 
-Camera Pinhole() {
-  Camera camera;
-  camera.name = "test";
-  camera.width = 640;
-  camera.height = 480;
-  camera.fps = 30;
-  camera.fx = 535.4;
-  camera.fy = 539.2;
-  camera.cx = 320.1;
-  camera.cy = 247.6;
-  return camera;
-}
-
 Camera WithDistortion() {  // TUM's fr1
-  Camera camera = Pinhole();
+  Camera camera = DefaultRoomCamera();
   camera.k1 = 0.262383;
   camera.k2 = -0.953104;
   camera.p1 = -0.005358;
@@ -79,12 +67,13 @@ TEST_P(CornersAreWhereTheyProject, WithinATenthOfAPixel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cameras, CornersAreWhereTheyProject, ::testing::Values(Pinhole(), WithDistortion()));
+INSTANTIATE_TEST_SUITE_P(Cameras, CornersAreWhereTheyProject,
+                         ::testing::Values(DefaultRoomCamera(), WithDistortion()));
 
 TEST(Renderer, TheNearerQuadHidesTheFartherWhateverTheirOrder) {
   const TexturedQuad far = Plain(50, {-2, -2, 3}, {4, 0, 0}, {0, 4, 0});
   const TexturedQuad near = Plain(200, {-0.2, -0.2, 2}, {0.4, 0, 0}, {0, 0.4, 0});
-  const Renderer renderer(Pinhole());
+  const Renderer renderer(DefaultRoomCamera());
   const cv::Mat one = renderer.Render({{far, near}}, {}), other = renderer.Render({{near, far}}, {});
   EXPECT_EQ(cv::norm(one, other, cv::NORM_INF), 0);
   EXPECT_EQ(one.at<uint8_t>(247, 320), 200);
@@ -92,7 +81,7 @@ TEST(Renderer, TheNearerQuadHidesTheFartherWhateverTheirOrder) {
 }
 
 TEST(Renderer, AQuadHasOneSideAndNothingBehindTheCameraIsSeen) {
-  const Renderer renderer(Pinhole());
+  const Renderer renderer(DefaultRoomCamera());
   EXPECT_EQ(cv::countNonZero(renderer.Render({{Plain(99, {2, -2, 3}, {-4, 0, 0}, {0, 4, 0})}}, {})), 0);
   EXPECT_EQ(cv::countNonZero(renderer.Render({{Plain(99, {-2, -2, -3}, {4, 0, 0}, {0, 4, 0})}}, {})), 0);
 }
@@ -100,7 +89,7 @@ TEST(Renderer, AQuadHasOneSideAndNothingBehindTheCameraIsSeen) {
 TEST(Renderer, AQuadThatPassesBesideTheCameraIsCutAtIt) {
   // A floor 1 m below that begins behind the camera: seen up to the horizon's height on the wall of its end.
   const TexturedQuad floor = Plain(120, {-5, 1, 8}, {10, 0, 0}, {0, 0, -16});
-  const cv::Mat image = Renderer(Pinhole()).Render({{floor}}, {});
+  const cv::Mat image = Renderer(DefaultRoomCamera()).Render({{floor}}, {});
   const int horizon = static_cast<int>(247.6 + 539.2 / 8);
   EXPECT_EQ(image.at<uint8_t>(479, 320), 120);
   EXPECT_EQ(image.at<uint8_t>(horizon + 3, 320), 120);
@@ -108,7 +97,7 @@ TEST(Renderer, AQuadThatPassesBesideTheCameraIsCutAtIt) {
 }
 
 TEST(Renderer, OutlinesAreCoveredInProportion) {
-  Camera camera = Pinhole();
+  Camera camera = DefaultRoomCamera();
   camera.fx = camera.fy = 500;
   camera.cx = 320;
   camera.cy = 240;
@@ -125,7 +114,7 @@ TEST(Renderer, FineTexturesFarAwayBecomeTheirMean) {
   cv::Mat1b stripes(512, 512);
   for (int x = 0; x < stripes.cols; ++x) stripes.col(x) = x % 2 == 0 ? 0 : 200;
   const TexturedQuad quad{{-5, -5, 10}, {10, 0, 0}, {0, 10, 0}, std::make_shared<Texture>(stripes), 1.0};
-  Camera camera = Pinhole();
+  Camera camera = DefaultRoomCamera();
   camera.fx = camera.fy = 100;  // 5 texels in a pixel
   const cv::Mat image = Renderer(camera).Render({{quad}}, {});
   cv::Scalar mean, deviation;
@@ -135,7 +124,7 @@ TEST(Renderer, FineTexturesFarAwayBecomeTheirMean) {
 }
 
 TEST(Renderer, RefusesAWrongCamera) {
-  Camera camera = Pinhole();
+  Camera camera = DefaultRoomCamera();
   camera.fx = 0;
   EXPECT_THROW(Renderer{camera}, InputError);
 }

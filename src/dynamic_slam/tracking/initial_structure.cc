@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/geometry/triangulation.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 #include "dynamic_slam/optimize/pose_optimizer.h"
@@ -13,7 +14,6 @@
 namespace dynamic_slam {
 namespace {
 
-constexpr double kChi2TwoDof = 5.991;
 constexpr double kFarBaselines = 200;
 constexpr double kMinParallaxRad = 0.3 * std::numbers::pi / 180.0;  // less leaves the depth open
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
