@@ -36,7 +36,7 @@ void DrawRun(const Room& room, const SlamSystem& system, const TruthComparison& 
                   room.options().frames, DescribeApe(comparison));
   const auto image_of = [&room](FrameId frame) { return room.Frame(static_cast<int>(frame.value())); };
   WritePicture((out / "overview.png").string(),
-               DrawOverview(title, system.map(), image_of, comparison, estimate));
+               DrawOverview(title, *system.map().Read(), image_of, comparison, estimate));
 }
 
 void RunDemo(const DemoArguments& arguments, int* exit_code) {
@@ -50,8 +50,7 @@ void RunDemo(const DemoArguments& arguments, int* exit_code) {
   RunConsole console(/*quiet=*/false);
   // From the files: faster than rendering again, and `run` on them gives the same result.
   const std::unique_ptr<FrameSource> source = OpenFrameSource(sequence);
-  RunSummary summary =
-      RunSequence(*source, system, [&console](const RunProgress& p) { return console.Show(p); });
+  RunSummary summary = RunSequence(*source, system, console.Control());
   summary.source = sequence.string();
   console.End();
   WriteResults(out, system, summary);
@@ -59,6 +58,7 @@ void RunDemo(const DemoArguments& arguments, int* exit_code) {
   const std::optional<TruthComparison> comparison = ReportTruth(sequence, system.FrameTrajectory(), out);
   if (comparison.has_value()) DrawRun(room, system, *comparison, out);
   fmt::print("results: {}\nimages:  {}\n", out.string(), sequence.string());
+  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
 

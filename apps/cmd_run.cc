@@ -68,16 +68,16 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::filesystem::path out = OutputFolder(arguments);
   PrepareOutputFolder(out);
 
-  SlamSystem system(camera, options);
+  SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
   RunConsole console(arguments.quiet);
-  RunSummary summary =
-      RunSequence(*source, system, [&console](const RunProgress& p) { return console.Show(p); });
+  RunSummary summary = RunSequence(*source, system, console.Control());
   summary.source = arguments.source;
   console.End();
   WriteResults(out, system, summary);
   PrintSummary(summary);
   ReportTruth(arguments.source, system.FrameTrajectory(), out);
   fmt::print("results: {}\n", out.string());
+  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
 
@@ -100,8 +100,11 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
   command->add_option("--detector", a.detector, "Object detector")
       ->check(CLI::IsMember({"none"}))
       ->capture_default_str();
-  command->add_option("--mode", a.mode, "offline: every frame, reproducible")
-      ->check(CLI::IsMember({"offline"}))
+  command
+      ->add_option("--mode", a.mode,
+                   "offline: every frame, reproducible. realtime: at the pace of the time stamps; "
+                   "frames that come too fast are dropped")
+      ->check(CLI::IsMember({"offline", "realtime"}))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
   command->add_option("--start", a.source_options.start, "Frames to skip first")

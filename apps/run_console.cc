@@ -36,9 +36,10 @@ RunConsole::~RunConsole() {
   std::signal(SIGTERM, SIG_DFL);
 }
 
-bool RunConsole::Show(const RunProgress& progress) {
-  if (interrupted != 0) return false;
-  if (quiet_) return true;
+bool RunConsole::ShouldStop() const { return interrupted != 0; }
+
+void RunConsole::Show(const RunProgress& progress) {
+  if (quiet_) return;
   const TrackingResult& tracking = progress.result->tracking;
   const bool changed = tracking.state != last_state_;
   last_state_ = tracking.state;
@@ -48,17 +49,22 @@ bool RunConsole::Show(const RunProgress& progress) {
                tracking.reason.empty() ? "" : ": ", tracking.reason);
   }
   // A file gets a line every five seconds, a terminal five a second.
-  if (SecondsSince(last_line_) < (overwrite_ ? 0.2 : 5.0)) return true;
+  if (SecondsSince(last_line_) < (overwrite_ ? 0.2 : 5.0)) return;
   last_line_ = Clock::now();
+  size_t keyframes = 0, landmarks = 0;
+  {
+    const auto map = progress.map->Read();
+    keyframes = map->keyframes().size();
+    landmarks = map->landmarks().size();
+  }
   const std::string total = progress.frames_total > 0 ? fmt::format("/{}", progress.frames_total) : "";
   fmt::print(stderr, "{}frame {}{}  {:.0f} frames/s  {}  {} inliers  {} keyframes  {} landmarks  {}{}",
              overwrite_ ? "\r\033[K" : "", progress.frame, total,
              static_cast<double>(progress.frame) / SecondsSince(start_), Name(tracking.state),
-             tracking.inliers, progress.map->keyframes().size(), progress.map->landmarks().size(),
+             tracking.inliers, keyframes, landmarks,
              tracking.state == TrackingState::kTracking ? "" : tracking.reason, overwrite_ ? "" : "\n");
   line_open_ = overwrite_;
   std::fflush(stderr);
-  return true;
 }
 
 void RunConsole::End() {
@@ -70,7 +76,11 @@ void PrintSummary(const RunSummary& summary) {
   fmt::print("{} of {} frames tracked ({:.1f}%), {} more have a pose, {} keyframes, {} landmarks\n",
              summary.frames_tracked, summary.frames_total, 100.0 * summary.Coverage(),
              summary.frames_backfilled, summary.keyframes, summary.landmarks);
+  if (summary.frames_dropped > 0) {
+    fmt::print("{} frames dropped: they came while tracking was late\n", summary.frames_dropped);
+  }
   if (summary.interrupted) fmt::print("interrupted: these are the results up to then\n");
+  if (summary.failure != nullptr) fmt::print("failed: these are the results up to then\n");
   if (summary.initialised_at.has_value()) {
     fmt::print("initialised at frame {}, lost {} times\n", *summary.initialised_at, summary.lost_count);
   } else {

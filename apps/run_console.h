@@ -8,8 +8,8 @@ namespace dynamic_slam {
 
 inline constexpr int kExitInterrupted = 130;
 
-// Shows a run on the terminal: one line that is written over, a line for each change of state, and takes Ctrl-C as
-// the wish to end the run with everything so far.
+// Shows a run on the terminal: one line that is written over, a line for each change of state, and takes
+// Ctrl-C as the wish to end the run with everything so far.
 class RunConsole {
  public:
   explicit RunConsole(bool quiet);
@@ -17,8 +17,15 @@ class RunConsole {
   RunConsole(const RunConsole&) = delete;
   RunConsole& operator=(const RunConsole&) = delete;
 
-  // False after an interrupt.
-  bool Show(const RunProgress& progress);
+  void Show(const RunProgress& progress);
+
+  // There was an interrupt.
+  bool ShouldStop() const;
+
+  // Both, for RunSequence.
+  RunControl Control() {
+    return {[this](const RunProgress& progress) { Show(progress); }, [this] { return ShouldStop(); }};
+  }
 
   // Ends the line.
   void End();

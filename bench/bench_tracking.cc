@@ -91,7 +91,7 @@ void RunBench(const BenchArguments& arguments) {
   std::vector<double> orb_ms = TimeOpenCvOrb(arguments.source);
   const double orb_before_ms = SummariseTimes(orb_ms).median;
   SlamSystem system(camera, options);
-  const RunSummary summary = RunSequence(*source, system, {});
+  const RunSummary summary = RunSequence(*source, system);
   const std::vector<double> after_ms = TimeOpenCvOrb(arguments.source);
   const double orb_after_ms = SummariseTimes(after_ms).median;
   orb_ms.insert(orb_ms.end(), after_ms.begin(), after_ms.end());

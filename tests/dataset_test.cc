@@ -27,7 +27,7 @@ class DatasetTest : public FolderTest {
     const auto source = OpenFrameSource(folder);
     const WholeRun run = RunAll(*source, camera.empty() ? source->OwnCamera().value() : LoadCamera(camera));
     EXPECT_GE(run.summary.Coverage(), min_coverage) << run.summary.last_reason;
-    EXPECT_THAT(run.system->map().Validate(), testing::IsEmpty());
+    EXPECT_THAT(run.system->map().Read()->Validate(), testing::IsEmpty());
     const auto truth = LoadGroundTruth(folder);
     ASSERT_TRUE(truth.has_value());
     const double rmse_m = ApeRmse(*truth, run.system->FrameTrajectory());

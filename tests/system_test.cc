@@ -62,7 +62,7 @@ TEST_P(RoomTest, TheCameraIsFollowedThroughIt) {
   EXPECT_EQ(summary.lost_count, 0);
   EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
             0.005 * PathLength(ToPoseList(room.truth())));
-  EXPECT_THAT(run.system->map().Validate(), IsEmpty());
+  EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
   EXPECT_EQ(run.system->KeyframeTrajectory().size(), summary.keyframes);
   EXPECT_EQ(summary.frames.size(), 300u);
 }
@@ -124,7 +124,7 @@ TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
   EXPECT_EQ(summary.frames.back().state, TrackingState::kTracking);
   EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
             0.005 * PathLength(ToPoseList(room.truth())));
-  EXPECT_THAT(run.system->map().Validate(), IsEmpty());
+  EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
 }
 
 TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {
@@ -140,7 +140,7 @@ TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {
   ASSERT_TRUE(summary.initialised_at.has_value());
   EXPECT_GT(*summary.initialised_at, 32u) << "of the second map";
   for (const StampedPose& pose : run.system->FrameTrajectory()) EXPECT_GT(pose.timestamp_s, 31.0 / 30);
-  EXPECT_THAT(run.system->map().Validate(), IsEmpty());
+  EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
 }
 
 TEST_F(SystemTest, NothingIsSeenUnderTheMask) {
@@ -151,7 +151,7 @@ TEST_F(SystemTest, NothingIsSeenUnderTheMask) {
   FrameResult result;
   for (int i = 0; i < 30; ++i) result = system.Process(room.truth()[i].timestamp_s, room.Frame(i), mask);
   EXPECT_EQ(result.tracking.state, TrackingState::kTracking) << result.tracking.reason;
-  system.map().keyframes().ForEach([](const Keyframe& keyframe) {
+  system.map().Read()->keyframes().ForEach([](const Keyframe& keyframe) {
     for (const Keypoint& keypoint : keyframe.features().keypoints) EXPECT_LT(keypoint.raw_x, 320);
   });
 }
@@ -159,8 +159,10 @@ TEST_F(SystemTest, NothingIsSeenUnderTheMask) {
 TEST_F(SystemTest, AnInterruptedRunKeepsWhatItHas) {
   const Room room = MakeRoom(200);
   SlamSystem system(room.options().camera, {});
-  const RunSummary summary = RunSequence(*MakeRoomSource(room), system,
-                                         [](const RunProgress& progress) { return progress.frame < 30; });
+  size_t frames = 0;
+  const RunSummary summary = RunSequence(
+      *MakeRoomSource(room), system,
+      {[&](const RunProgress& progress) { frames = progress.frame; }, [&] { return frames == 30; }});
   EXPECT_TRUE(summary.interrupted);
   EXPECT_EQ(summary.frames_total, 30u);
   EXPECT_EQ(CountState(summary, TrackingState::kTracking), static_cast<int>(summary.frames_tracked));

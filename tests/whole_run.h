@@ -43,7 +43,7 @@ struct WholeRun {
 inline WholeRun RunAll(FrameSource& source, const Camera& camera, const SystemOptions& options = {}) {
   WholeRun run;
   run.system = std::make_unique<SlamSystem>(camera, options);
-  run.summary = RunSequence(source, *run.system, {});
+  run.summary = RunSequence(source, *run.system);
   return run;
 }
 

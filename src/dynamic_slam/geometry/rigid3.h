@@ -43,6 +43,10 @@ struct Rigid3 {
   // target frame's origin in the source frame (a camera's centre, for cam_from_world).
   Eigen::Vector3d TargetOriginInSource() const { return -(rotation.conjugate() * translation); }
 
+  bool operator==(const Rigid3& other) const {
+    return rotation.coeffs() == other.rotation.coeffs() && translation == other.translation;
+  }
+
   bool IsFinite() const { return rotation.coeffs().allFinite() && translation.allFinite(); }
 };
 

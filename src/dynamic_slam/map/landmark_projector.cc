@@ -28,8 +28,9 @@ void LandmarkProjector::SetPose(const Rigid3& cam_from_world) {
   center_ = cam_from_world.TargetOriginInSource();
 }
 
-bool LandmarkProjector::Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal, float min_distance,
-                                float max_distance, LandmarkProjection* projection) const {
+bool LandmarkProjector::Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal,
+                                float min_distance, float max_distance,
+                                LandmarkProjection* projection) const {
   const Eigen::Vector3d x_in_cam = rotation_ * x_in_world + translation_;
   if (x_in_cam.z() <= 0) return false;
   projection->px = camera_.Project(x_in_cam);

@@ -16,16 +16,16 @@ struct LandmarkProjection {
   int octave = 0;
 };
 
-// Tells of landmarks whether a view at a given pose can see them: before the camera, inside the image, from a distance
-// and a direction that resemble those from which they have been seen.
+// Tells of landmarks whether a view at a given pose can see them: before the camera, inside the image, from a
+// distance and a direction that resemble those from which they have been seen.
 class LandmarkProjector {
  public:
   LandmarkProjector(const Camera& camera, const std::vector<float>& octave_scales);
 
   void SetPose(const Rigid3& cam_from_world);
 
-  bool Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal, float min_distance, float max_distance,
-               LandmarkProjection* projection) const;
+  bool Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal, float min_distance,
+               float max_distance, LandmarkProjection* projection) const;
 
   // Inside the image, in ideal px.
   bool IsInImage(const Eigen::Vector2d& px) const {

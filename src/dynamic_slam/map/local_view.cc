@@ -36,6 +36,9 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
       view->reference = KeyframeId(i);
     }
   }
+  if (view->reference.IsValid()) {
+    view->reference_from_world = map.keyframes().At(view->reference).cam_from_world();
+  }
   const size_t limit = static_cast<size_t>(max_keyframes);
   std::stable_sort(keyframes_.begin(), keyframes_.end(),
                    [this](KeyframeId a, KeyframeId b) { return votes_[a.value()] > votes_[b.value()]; });

@@ -6,25 +6,27 @@
 
 #include "dynamic_slam/base/ids.h"
 #include "dynamic_slam/features/features.h"
+#include "dynamic_slam/geometry/rigid3.h"
 #include "dynamic_slam/map/map.h"
 
 namespace dynamic_slam {
 
-// The landmarks that tracking may see next, copied out of the map so that it can work without looking at the map:
-// a structure of arrays, entry i of each belongs to one landmark.
+// The landmarks that tracking may see next, copied out of the map so that it can work without looking at the
+// map: a structure of arrays, entry i of each belongs to one landmark.
 struct LocalView {
   std::vector<LandmarkId> ids;
   std::vector<Eigen::Vector3d> positions;  // in world
   std::vector<Eigen::Vector3f> normals;
   std::vector<float> min_distances, max_distances;
   std::vector<Descriptor> descriptors;
-  KeyframeId reference;  // the keyframe that shares most landmarks with the frame
+  KeyframeId reference;         // the keyframe that shares most landmarks with the frame
+  Rigid3 reference_from_world;  // where it was when the view was made: the map goes on changing
 
   size_t size() const { return ids.size(); }
 };
 
-// Finds the keyframes that see the given landmarks, adds their best neighbours up to max_keyframes, and copies what
-// they all see. Entries that are not valid or gone are passed over. Keeps the buffers of *view.
+// Finds the keyframes that see the given landmarks, adds their best neighbours up to max_keyframes, and
+// copies what they all see. Entries that are not valid or gone are passed over. Keeps the buffers of *view.
 class LocalViewBuilder {
  public:
   void Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes, LocalView* view);

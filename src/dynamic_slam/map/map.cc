@@ -24,6 +24,12 @@ bool Landmark::IsSeenBy(KeyframeId keyframe) const {
   return position != observations_.end() && position->keyframe == keyframe;
 }
 
+void Map::Reset() {
+  const uint32_t epoch = epoch_;
+  *this = Map(std::move(octave_scales_));
+  epoch_ = epoch + 1;
+}
+
 void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id) {
   Keyframe& keyframe = keyframes_.At(keyframe_id);
   Landmark& landmark = landmarks_.At(landmark_id);

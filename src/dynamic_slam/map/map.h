@@ -19,6 +19,11 @@ class Map {
   // octave_scales: size of a pixel of each octave in full-resolution px (OctaveScales of features).
   explicit Map(std::vector<float> octave_scales) : octave_scales_(std::move(octave_scales)) {}
 
+  // Empties the map. Ids start again from 0, so that those of before mean nothing any more: whoever keeps ids
+  // while the map is unlocked compares the epoch.
+  void Reset();
+  uint32_t epoch() const { return epoch_; }
+
   Keyframe& AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world, FeatureSet features,
                         KeypointGrid grid) {
     return keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features), std::move(grid));
@@ -72,6 +77,7 @@ class Map {
 
  private:
   std::vector<float> octave_scales_;
+  uint32_t epoch_ = 0;
   IdTable<KeyframeId, Keyframe> keyframes_;
   IdTable<LandmarkId, Landmark> landmarks_;
   std::vector<LandmarkId> merged_into_;  // by landmark id; filled as far as needed

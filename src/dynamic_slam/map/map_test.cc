@@ -29,14 +29,17 @@ FeatureSet MakeFeatures(uint32_t count, uint64_t seed) {
 
 KeyframeId AddKeyframe(Map* map, uint32_t keypoints, const Rigid3& cam_from_world = {}) {
   const uint32_t number = static_cast<uint32_t>(map->keyframes().CreatedCount());
-  return map->AddKeyframe(FrameId(number), number, cam_from_world, MakeFeatures(keypoints, number), KeypointGrid()).id();
+  return map
+      ->AddKeyframe(FrameId(number), number, cam_from_world, MakeFeatures(keypoints, number), KeypointGrid())
+      .id();
 }
 
 Map MakeMap() { return Map({1.0f, 1.2f, 1.44f}); }
 
 LandmarkId AddLandmark(Map* map, const std::vector<Observation>& observations) {
   const LandmarkId id = map->AddLandmark({0, 0, 2}, observations.back().keyframe).id();
-  for (const Observation& observation : observations) map->Link(observation.keyframe, observation.keypoint, id);
+  for (const Observation& observation : observations)
+    map->Link(observation.keyframe, observation.keypoint, id);
   return id;
 }
 
@@ -90,7 +93,8 @@ TEST(MapTest, FramesOfAnErasedKeyframeKeepTheirPose) {
   Map map = MakeMap();
   const Rigid3 pose_a(ExpSo3({0.1, 0, 0}), {1, 0, 0}), pose_b(ExpSo3({0, 0.2, 0}), {0, 2, 0}),
       pose_c(ExpSo3({0, 0, 0.3}), {0, 0, 3});
-  const KeyframeId a = AddKeyframe(&map, 4, pose_a), b = AddKeyframe(&map, 4, pose_b), c = AddKeyframe(&map, 4, pose_c);
+  const KeyframeId a = AddKeyframe(&map, 4, pose_a), b = AddKeyframe(&map, 4, pose_b),
+                   c = AddKeyframe(&map, 4, pose_c);
   AddLandmark(&map, {{a, 0}, {b, 0}, {c, 0}});
   const Rigid3 cam_from_a(ExpSo3({0.05, 0.05, 0}), {0.1, 0.2, 0.3});
   const Rigid3 before = map.PoseFromReference(a, cam_from_a);

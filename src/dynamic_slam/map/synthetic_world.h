@@ -8,7 +8,7 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/two_view_scene.h"
 #include "dynamic_slam/map/frame.h"
-#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/map/shared_map.h"
 
 namespace dynamic_slam {
 
@@ -86,7 +86,8 @@ class SyntheticWorld {
 // A map of a synthetic world.
 class SyntheticMap {
  public:
-  explicit SyntheticMap(SyntheticWorld* world) : map(SyntheticWorld::OctaveScales()), world_(world) {}
+  explicit SyntheticMap(SyntheticWorld* world)
+      : shared_map(SyntheticWorld::OctaveScales()), map(*shared_map.Write()), world_(world) {}
 
   // A keyframe at the pose that sees no landmark yet.
   KeyframeId Add(const Rigid3& cam_from_world) {
@@ -124,7 +125,8 @@ class SyntheticMap {
     return views[observation.keyframe.value()].points[observation.keypoint];
   }
 
-  Map map;
+  SharedMap shared_map;
+  Map& map;                          // without its lock: a test has one thread
   std::vector<SyntheticView> views;  // by keyframe id
 
  private:

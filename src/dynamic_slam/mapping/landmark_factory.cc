@@ -86,25 +86,43 @@ uint32_t FindOnSegment(const FreeKeypoints& candidates, const EpipolarSegment& s
 LandmarkFactory::LandmarkFactory(const Camera& camera, const MapperOptions& options)
     : camera_(camera), options_(options) {}
 
-std::vector<LandmarkId> LandmarkFactory::Create(KeyframeId id, Map* map) const {
-  std::vector<LandmarkId> created;
-  const Keyframe& keyframe = map->keyframes().At(id);
+std::vector<KeyframeId> LandmarkFactory::Neighbours(const Map& map, KeyframeId id) const {
+  std::vector<KeyframeId> neighbours;
+  const Keyframe& keyframe = map.keyframes().At(id);
   const size_t count = static_cast<size_t>(options_.triangulation_neighbours);
   for (const CovisibleKeyframe& other : keyframe.BestCovisible(count)) {
-    const Keyframe& neighbour = map->keyframes().At(other.id);
-    const double median_depth = map->MedianDepth(other.id);
+    const Keyframe& neighbour = map.keyframes().At(other.id);
     const double baseline = (neighbour.CenterInWorld() - keyframe.CenterInWorld()).norm();
-    if (baseline < options_.min_baseline_ratio * median_depth) continue;
-    CreateWithNeighbour(keyframe, neighbour, median_depth, map, &created);
+    if (baseline >= options_.min_baseline_ratio * map.MedianDepth(other.id)) neighbours.push_back(other.id);
   }
-  for (const LandmarkId landmark : created) map->RefreshLandmark(landmark);
-  return created;
+  return neighbours;
 }
 
-void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyframe& neighbour,
-                                          double median_depth, Map* map,
-                                          std::vector<LandmarkId>* created) const {
-  const std::vector<float>& scales = map->octave_scales();
+std::vector<LandmarkId> LandmarkFactory::Add(const std::vector<LandmarkProposal>& proposals, Map* map) {
+  std::vector<LandmarkId> added;
+  for (const LandmarkProposal& proposal : proposals) {
+    const Keyframe* first = map->keyframes().Find(proposal.first);
+    const Keyframe* second = map->keyframes().Find(proposal.second);
+    if (first == nullptr || second == nullptr || first->landmarks()[proposal.first_keypoint].IsValid() ||
+        second->landmarks()[proposal.second_keypoint].IsValid()) {
+      continue;
+    }
+    const LandmarkId id = map->AddLandmark(proposal.position, proposal.first).id();
+    map->Link(proposal.first, proposal.first_keypoint, id);
+    map->Link(proposal.second, proposal.second_keypoint, id);
+    map->RefreshLandmark(id);
+    added.push_back(id);
+  }
+  return added;
+}
+
+std::vector<LandmarkProposal> LandmarkFactory::Propose(const Map& map, KeyframeId keyframe_id,
+                                                       KeyframeId neighbour_id) const {
+  std::vector<LandmarkProposal> proposals;
+  const Keyframe& keyframe = map.keyframes().At(keyframe_id);
+  const Keyframe& neighbour = map.keyframes().At(neighbour_id);
+  const double median_depth = map.MedianDepth(neighbour_id);
+  const std::vector<float>& scales = map.octave_scales();
   const Rigid3 neighbour_from_keyframe = neighbour.cam_from_world() * keyframe.cam_from_world().Inverse();
   const Eigen::Matrix3d rotation = neighbour_from_keyframe.Matrix();
   const Rigid3 world_from_keyframe = keyframe.cam_from_world().Inverse();
@@ -147,7 +165,7 @@ void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyfra
 
   const std::vector<uint8_t>& keep = consistency.Judge();
   for (size_t k = 0; k < found.size(); ++k) {
-    if (keep[k] == 0 || neighbour.landmarks()[found[k].second].IsValid()) continue;
+    if (keep[k] == 0) continue;
     const Keypoint& first = keyframe.keypoint(found[k].first);
     const Keypoint& second = neighbour.keypoint(found[k].second);
     const Eigen::Vector3d first_ray = camera_.Unproject({first.x, first.y});
@@ -171,11 +189,10 @@ void LandmarkFactory::CreateWithNeighbour(const Keyframe& keyframe, const Keyfra
     if (distance_ratio > octave_ratio * max_scale_ratio || distance_ratio * max_scale_ratio < octave_ratio)
       continue;
 
-    const LandmarkId id = map->AddLandmark(world_from_keyframe * *x_in_keyframe, keyframe.id()).id();
-    map->Link(keyframe.id(), found[k].first, id);
-    map->Link(neighbour.id(), found[k].second, id);
-    created->push_back(id);
+    proposals.push_back(
+        {keyframe_id, neighbour_id, found[k].first, found[k].second, world_from_keyframe * *x_in_keyframe});
   }
+  return proposals;
 }
 
 }  // namespace dynamic_slam

@@ -1,24 +1,25 @@
 #include "dynamic_slam/mapping/landmark_fusion.h"
 
-#include <vector>
-
 #include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/geometry/chi2.h"
-#include "dynamic_slam/map/landmark_projector.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr double kRadiusPx = 3.0;
 
-void FuseInto(const std::vector<LandmarkId>& landmarks, const Keyframe& target, LandmarkProjector* projector,
-              Map* map, FusionCount* count) {
-  projector->SetPose(target.cam_from_world());
+}  // namespace
+
+FusionCount LandmarkFusion::FuseInto(KeyframeId target_id, const std::vector<LandmarkId>& landmarks,
+                                     Map* map) {
+  FusionCount count;
+  const Keyframe& target = map->keyframes().At(target_id);
+  projector_.SetPose(target.cam_from_world());
   for (const LandmarkId candidate : landmarks) {
     const Landmark* landmark = map->landmarks().Find(candidate);  // may have been merged a moment ago
     if (landmark == nullptr || landmark->IsSeenBy(target.id())) continue;
     LandmarkProjection projection;
-    if (!projector->Project(landmark->position(), landmark->normal(), landmark->min_distance(),
+    if (!projector_.Project(landmark->position(), landmark->normal(), landmark->min_distance(),
                             landmark->max_distance(), &projection)) {
       continue;
     }
@@ -38,34 +39,15 @@ void FuseInto(const std::vector<LandmarkId>& landmarks, const Keyframe& target, 
     if (!present.IsValid()) {
       map->Link(target.id(), match.keypoint, candidate);
       map->RefreshLandmark(candidate);
-      ++count->linked;
+      ++count.linked;
     } else {
       // The one with more evidence stays.
       const bool keep_present =
           map->landmarks().At(present).observations().size() >= landmark->observations().size();
       map->MergeLandmarks(keep_present ? candidate : present, keep_present ? present : candidate);
-      ++count->merged;
+      ++count.merged;
     }
   }
-}
-
-}  // namespace
-
-FusionCount FuseLandmarks(const Camera& camera, const MapperOptions& options, KeyframeId id, Map* map) {
-  FusionCount count;
-  LandmarkProjector projector(camera, map->octave_scales());
-  const Keyframe& keyframe = map->keyframes().At(id);
-  const std::vector<CovisibleKeyframe> neighbours =
-      keyframe.BestCovisible(static_cast<size_t>(options.fusion_neighbours));
-
-  const std::vector<LandmarkId> mine = keyframe.landmarks();
-  std::vector<LandmarkId> theirs;
-  for (const CovisibleKeyframe& neighbour : neighbours) {
-    const Keyframe& target = map->keyframes().At(neighbour.id);
-    theirs.insert(theirs.end(), target.landmarks().begin(), target.landmarks().end());
-    FuseInto(mine, target, &projector, map, &count);
-  }
-  FuseInto(theirs, keyframe, &projector, map, &count);
   return count;
 }
 

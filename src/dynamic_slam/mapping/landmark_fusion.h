@@ -1,8 +1,10 @@
 #pragma once
 
+#include <vector>
+
 #include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/map/landmark_projector.h"
 #include "dynamic_slam/map/map.h"
-#include "dynamic_slam/mapping/mapper_options.h"
 
 namespace dynamic_slam {
 
@@ -11,8 +13,17 @@ struct FusionCount {
   int merged = 0;  // pairs of landmarks that were one
 };
 
-// Projects the keyframe's landmarks into its neighbours and theirs into it; links what is found, merges what
-// is twice.
-FusionCount FuseLandmarks(const Camera& camera, const MapperOptions& options, KeyframeId keyframe, Map* map);
+// Projects landmarks into a keyframe; links what is found, merges what is twice. Passes over landmarks that
+// are gone.
+class LandmarkFusion {
+ public:
+  LandmarkFusion(const Camera& camera, const std::vector<float>& octave_scales)
+      : projector_(camera, octave_scales) {}
+
+  FusionCount FuseInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, Map* map);
+
+ private:
+  LandmarkProjector projector_;
+};
 
 }  // namespace dynamic_slam

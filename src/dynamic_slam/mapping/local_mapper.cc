@@ -1,6 +1,5 @@
 #include "dynamic_slam/mapping/local_mapper.h"
 
-#include "dynamic_slam/mapping/landmark_fusion.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 
 namespace dynamic_slam {
@@ -18,69 +17,122 @@ constexpr int kRedundantViews = 3;
 
 }  // namespace
 
-LocalMapper::LocalMapper(const Camera& camera, const MapperOptions& options, Map* map)
-    : camera_(camera), options_(options), map_(map), factory_(camera, options) {}
+LocalMapper::LocalMapper(const Camera& camera, const MapperOptions& options, SharedMap* map)
+    : camera_(camera),
+      options_(options),
+      map_(map),
+      factory_(camera, options),
+      fusion_(camera, map->Read()->octave_scales()) {}
 
-MappingResult LocalMapper::Process(KeyframeId keyframe) {
+MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
+                                   const std::function<bool()>& should_stop) {
+  if (epoch != epoch_) recent_landmarks_.clear();
+  epoch_ = epoch;
   MappingResult result;
-  result.culled_landmarks = CullRecentLandmarks(keyframe);
-  const std::vector<LandmarkId> created = factory_.Create(keyframe, map_);
-  recent_landmarks_.insert(recent_landmarks_.end(), created.begin(), created.end());
-  result.created = static_cast<int>(created.size());
-  result.merged_landmarks = FuseLandmarks(camera_, options_, keyframe, map_).merged;
-  if (map_->keyframes().size() >= 2) result.bundle = AdjustLocal(camera_, options_, keyframe, map_);
-  result.culled_keyframes = CullRedundantKeyframes(keyframe);
+  const auto adjust = [&] {
+    result.bundle = AdjustLocal(camera_, options_, keyframe, epoch_, should_stop, map_);
+    return true;
+  };
+  const bool done = Change([&](Map* map) { CullRecentLandmarks(keyframe, map, &result); }) &&
+                    CreateLandmarks(keyframe, &result) && FuseLandmarks(keyframe, &result) && adjust() &&
+                    CullRedundantKeyframes(keyframe, &result);
+  result.abandoned = !done;
   return result;
 }
 
-BundleSummary LocalMapper::Finish() {
-  return map_->keyframes().size() < 2 ? BundleSummary() : AdjustAll(camera_, options_, map_);
+BundleSummary LocalMapper::Finish(const std::function<bool()>& should_stop) {
+  return AdjustAll(camera_, options_, should_stop, map_);
 }
 
-int LocalMapper::CullRecentLandmarks(KeyframeId current) {
-  int culled = 0;
+void LocalMapper::CullRecentLandmarks(KeyframeId current, Map* map, MappingResult* result) {
   size_t kept = 0;
   for (const LandmarkId id : recent_landmarks_) {
-    const Landmark* landmark = map_->landmarks().Find(id);
+    const Landmark* landmark = map->landmarks().Find(id);
     if (landmark == nullptr) continue;
     const uint32_t age = current.value() - landmark->created_by().value();
     const bool unseen = age >= 2 && landmark->observations().size() < kMinObservations;
     if (landmark->FoundRatio() < kMinFoundRatio || unseen) {
-      map_->EraseLandmark(id);
-      ++culled;
+      map->EraseLandmark(id);
+      ++result->culled_landmarks;
     } else if (age < kProbationKeyframes) {
       recent_landmarks_[kept++] = id;
     }
   }
   recent_landmarks_.resize(kept);
-  return culled;
 }
 
-int LocalMapper::CullRedundantKeyframes(KeyframeId current) {
-  int culled = 0;
-  const std::vector<CovisibleKeyframe> neighbours =
-      map_->keyframes().At(current).BestCovisible(map_->keyframes().size());
-  for (const CovisibleKeyframe& neighbour : neighbours) {
-    const Keyframe& keyframe = map_->keyframes().At(neighbour.id);
-    if (keyframe.id().value() == 0) continue;  // the origin of the world
-    int landmarks = 0, redundant = 0;
-    for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
-      if (!keyframe.landmarks()[i].IsValid()) continue;
-      ++landmarks;
-      int views = 0;
-      for (const Observation& other : map_->landmarks().At(keyframe.landmarks()[i]).observations()) {
-        if (other.keyframe == keyframe.id()) continue;
-        views += map_->keyframes().At(other.keyframe).keypoint(other.keypoint).octave <=
-                 keyframe.keypoint(i).octave + 1;
-      }
-      redundant += views >= kRedundantViews;
-    }
-    if (landmarks > 0 && redundant > options_.redundant_ratio * landmarks) {
-      map_->EraseKeyframe(keyframe.id(), keyframe.BestCovisible(1).front().id);
-      ++culled;
-    }
+bool LocalMapper::CreateLandmarks(KeyframeId current, MappingResult* result) {
+  std::vector<KeyframeId> neighbours;
+  bool valid = Look([&](const Map& map) { neighbours = factory_.Neighbours(map, current); });
+  for (size_t i = 0; valid && i < neighbours.size(); ++i) {
+    std::vector<LandmarkProposal> proposals;
+    valid = Look([&](const Map& map) { proposals = factory_.Propose(map, current, neighbours[i]); });
+    valid = valid && Change([&](Map* map) {
+              const std::vector<LandmarkId> added = LandmarkFactory::Add(proposals, map);
+              recent_landmarks_.insert(recent_landmarks_.end(), added.begin(), added.end());
+              result->created += static_cast<int>(added.size());
+            });
   }
-  return culled;
+  return valid;
+}
+
+bool LocalMapper::FuseLandmarks(KeyframeId current, MappingResult* result) {
+  std::vector<CovisibleKeyframe> neighbours;
+  std::vector<LandmarkId> mine;
+  bool valid = Look([&](const Map& map) {
+    const Keyframe& keyframe = map.keyframes().At(current);
+    neighbours = keyframe.BestCovisible(static_cast<size_t>(options_.fusion_neighbours));
+    mine = keyframe.landmarks();
+  });
+  const auto fuse = [&](KeyframeId target, const std::vector<LandmarkId>& landmarks, Map* map) {
+    result->merged_landmarks += fusion_.FuseInto(target, landmarks, map).merged;
+  };
+  for (size_t i = 0; valid && i < neighbours.size(); ++i) {
+    valid = Change([&](Map* map) { fuse(neighbours[i].id, mine, map); });
+  }
+  for (size_t i = 0; valid && i < neighbours.size(); ++i) {
+    valid = Change([&](Map* map) {
+      const std::vector<LandmarkId> theirs = map->keyframes().At(neighbours[i].id).landmarks();
+      fuse(current, theirs, map);
+    });
+  }
+  return valid;
+}
+
+bool LocalMapper::CullRedundantKeyframes(KeyframeId current, MappingResult* result) {
+  std::vector<CovisibleKeyframe> neighbours;
+  bool valid = Look([&](const Map& map) {
+    neighbours = map.keyframes().At(current).BestCovisible(map.keyframes().size());
+  });
+  for (size_t i = 0; valid && i < neighbours.size(); ++i) {
+    // Neither the origin of the world nor what still waits to be processed.
+    const KeyframeId id = neighbours[i].id;
+    if (id == KeyframeId(0) || current < id) continue;
+    bool is_redundant = false;
+    valid = Look([&](const Map& map) { is_redundant = IsRedundant(map, map.keyframes().At(id)); });
+    if (!valid || !is_redundant) continue;
+    valid = Change([&](Map* map) {
+      map->EraseKeyframe(id, map->keyframes().At(id).BestCovisible(1).front().id);
+      ++result->culled_keyframes;
+    });
+  }
+  return valid;
+}
+
+bool LocalMapper::IsRedundant(const Map& map, const Keyframe& keyframe) const {
+  int landmarks = 0, redundant = 0;
+  for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
+    if (!keyframe.landmarks()[i].IsValid()) continue;
+    ++landmarks;
+    int views = 0;
+    for (const Observation& other : map.landmarks().At(keyframe.landmarks()[i]).observations()) {
+      if (other.keyframe == keyframe.id()) continue;
+      views += map.keyframes().At(other.keyframe).keypoint(other.keypoint).octave <=
+               keyframe.keypoint(i).octave + 1;
+    }
+    redundant += views >= kRedundantViews;
+  }
+  return landmarks > 0 && redundant > options_.redundant_ratio * landmarks;
 }
 
 }  // namespace dynamic_slam

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "dynamic_slam/geometry/camera.h"
-#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/landmark_factory.h"
+#include "dynamic_slam/mapping/landmark_fusion.h"
 #include "dynamic_slam/mapping/mapper_options.h"
+#include "dynamic_slam/optimize/bundle_adjustment.h"
 
 namespace dynamic_slam {
 
@@ -15,32 +18,56 @@ struct MappingResult {
   int merged_landmarks = 0;
   int culled_keyframes = 0;
   BundleSummary bundle;
+  bool abandoned = false;  // the keyframe's map was given up before, or meanwhile
 };
 
 // What happens to the map about a new keyframe: doubtful landmarks go, new ones come, duplicates are fused,
-// poses and points are adjusted, redundant keyframes go. Synchronous.
+// poses and points are adjusted, redundant keyframes go. Synchronous; it holds the map's lock for moments
+// only, so that tracking goes on meanwhile. No one else takes landmarks or keyframes away, except all at once
+// (Map::epoch).
 class LocalMapper {
  public:
-  LocalMapper(const Camera& camera, const MapperOptions& options, Map* map);
+  LocalMapper(const Camera& camera, const MapperOptions& options, SharedMap* map);
 
-  // `keyframe` is in the map, its landmarks linked.
-  MappingResult Process(KeyframeId keyframe);
+  // `keyframe` was put into the map of this epoch, its landmarks linked. `should_stop` may be empty; when it
+  // says so, bundle adjustment ends with what it has.
+  MappingResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
 
   // Bundle adjustment over everything, when the sequence is over.
-  BundleSummary Finish();
-
-  // The map was emptied.
-  void Reset() { recent_landmarks_.clear(); }
+  BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
  private:
-  int CullRecentLandmarks(KeyframeId current);
-  int CullRedundantKeyframes(KeyframeId current);
+  // Runs look(const Map&) or change(Map*) with the map locked. False, and not run, when the map is not that
+  // of the epoch any more.
+  template <class Fn>
+  bool Look(Fn&& look) const {
+    const auto map = map_->Read();
+    if (map->epoch() != epoch_) return false;
+    look(*map);
+    return true;
+  }
+  template <class Fn>
+  bool Change(Fn&& change) {
+    const auto map = map_->Write();
+    if (map->epoch() != epoch_) return false;
+    change(map.get());
+    return true;
+  }
+
+  // One step each; false when the map was given up.
+  bool CreateLandmarks(KeyframeId current, MappingResult* result);
+  bool FuseLandmarks(KeyframeId current, MappingResult* result);
+  bool CullRedundantKeyframes(KeyframeId current, MappingResult* result);
+  void CullRecentLandmarks(KeyframeId current, Map* map, MappingResult* result);
+  bool IsRedundant(const Map& map, const Keyframe& keyframe) const;
 
   Camera camera_;
   MapperOptions options_;
-  Map* map_;
+  SharedMap* map_;
   LandmarkFactory factory_;
-  std::vector<LandmarkId> recent_landmarks_;
+  LandmarkFusion fusion_;
+  uint32_t epoch_ = 0;
+  std::vector<LandmarkId> recent_landmarks_;  // of the epoch
 };
 
 }  // namespace dynamic_slam

@@ -35,11 +35,36 @@ struct TwoKeyframes {
   KeyframeId first, second;
 };
 
+std::vector<LandmarkId> CreateLandmarks(TwoKeyframes* two, const MapperOptions& options = {}) {
+  const LandmarkFactory factory(two->world.camera(), options);
+  std::vector<LandmarkId> created;
+  for (const KeyframeId neighbour : factory.Neighbours(two->scene.map, two->second)) {
+    const auto added =
+        LandmarkFactory::Add(factory.Propose(two->scene.map, two->second, neighbour), &two->scene.map);
+    created.insert(created.end(), added.begin(), added.end());
+  }
+  return created;
+}
+
+FusionCount FuseWithNeighbours(const Camera& camera, KeyframeId id, Map* map) {
+  LandmarkFusion fusion(camera, map->octave_scales());
+  FusionCount sum;
+  for (const CovisibleKeyframe& neighbour : map->keyframes().At(id).BestCovisible(10)) {
+    for (const auto& [from, to] : {std::pair(id, neighbour.id), std::pair(neighbour.id, id)}) {
+      const std::vector<LandmarkId> landmarks = map->keyframes().At(from).landmarks();
+      const FusionCount count = fusion.FuseInto(to, landmarks, map);
+      sum.linked += count.linked;
+      sum.merged += count.merged;
+    }
+  }
+  return sum;
+}
+
 TEST(LandmarkFactoryTest, NewLandmarksAreNearTheTruth) {
   TwoKeyframes two(0.5);
   Map& map = two.scene.map;
   const int possible = two.CountShared() - static_cast<int>(map.landmarks().size());
-  const std::vector<LandmarkId> created = LandmarkFactory(two.world.camera(), {}).Create(two.second, &map);
+  const std::vector<LandmarkId> created = CreateLandmarks(&two);
   EXPECT_GT(static_cast<int>(created.size()), 0.85 * possible);
   std::vector<double> errors;
   int wrong = 0;
@@ -62,24 +87,23 @@ TEST(LandmarkFactoryTest, WithoutParallaxThereAreNone) {
   TwoKeyframes two(0.07);  // 0.6 to 1.4 deg
   MapperOptions options;
   options.min_parallax_deg = 2;
-  EXPECT_THAT(LandmarkFactory(two.world.camera(), options).Create(two.second, &two.scene.map), IsEmpty());
+  EXPECT_THAT(CreateLandmarks(&two, options), IsEmpty());
   options.min_parallax_deg = 0.1;
-  EXPECT_GT(LandmarkFactory(two.world.camera(), options).Create(two.second, &two.scene.map).size(), 100u)
-      << "it was the parallax";
+  EXPECT_GT(CreateLandmarks(&two, options).size(), 100u) << "it was the parallax";
 }
 
 TEST(LandmarkFactoryTest, NeighboursAtTheSamePlaceAreLeftOut) {
   TwoKeyframes two(0.03);
   MapperOptions options;
   options.min_parallax_deg = 0;
-  EXPECT_THAT(LandmarkFactory(two.world.camera(), options).Create(two.second, &two.scene.map), IsEmpty());
+  EXPECT_THAT(CreateLandmarks(&two, options), IsEmpty());
 }
 
 TEST(LandmarkFactoryTest, NothingIsMadeBehindTheCamera) {
   TwoKeyframes two(0.5);
   // As if the camera had gone the other way: all rays meet behind it.
   two.scene.map.keyframes().At(two.second).set_cam_from_world(SidewaysPose(-0.5));
-  EXPECT_LE(LandmarkFactory(two.world.camera(), {}).Create(two.second, &two.scene.map).size(), 2u);
+  EXPECT_LE(CreateLandmarks(&two).size(), 2u);
 }
 
 TEST(LandmarkFusionTest, DuplicatesBecomeOne) {
@@ -92,7 +116,7 @@ TEST(LandmarkFusionTest, DuplicatesBecomeOne) {
   scene.AddLandmarks(150, 300, ids);
   const size_t before = scene.map.landmarks().size();
 
-  const FusionCount count = FuseLandmarks(world.camera(), {}, ids[3], &scene.map);
+  const FusionCount count = FuseWithNeighbours(world.camera(), ids[3], &scene.map);
   EXPECT_EQ(scene.map.landmarks().size(), before - static_cast<size_t>(count.merged));
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
   std::vector<int> landmarks_of(world.size(), 0);
@@ -114,7 +138,7 @@ TEST(LandmarkFusionTest, UnknownSightingsAreLinked) {
   for (int i = 0; i < 3; ++i) ids.push_back(scene.Add(SidewaysPose(0.1 * i)));
   scene.AddLandmarks(0, 20, ids);
   const int unknown_to_third = scene.AddLandmarks(20, 200, {ids[0], ids[1]});
-  const FusionCount count = FuseLandmarks(world.camera(), {}, ids[2], &scene.map);
+  const FusionCount count = FuseWithNeighbours(world.camera(), ids[2], &scene.map);
   EXPECT_EQ(count.merged, 0);
   EXPECT_GT(count.linked, 0.85 * unknown_to_third);
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
@@ -154,7 +178,7 @@ TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
     pose.translation += 0.02 * Eigen::Vector3d(random.Gaussian(), random.Gaussian(), random.Gaussian());
     scene.map.keyframes().At(ids[i]).set_cam_from_world(pose);
   }
-  const BundleSummary summary = AdjustAll(world.camera(), {}, &scene.map);
+  const BundleSummary summary = AdjustAll(world.camera(), {}, {}, &scene.shared_map);
   EXPECT_TRUE(summary.usable);
   EXPECT_FALSE(scene.map.keyframes().At(ids[2]).landmarks()[free].IsValid());
   // The scale is free: compare the shape of the path.
@@ -169,11 +193,11 @@ TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
 TEST(LocalMapperTest, ARedundantKeyframeGoesAndItsFramesStay) {
   SyntheticWorld world(400);
   SyntheticMap scene(&world);
-  LocalMapper mapper(world.camera(), {}, &scene.map);
+  LocalMapper mapper(world.camera(), {}, &scene.shared_map);
   std::vector<KeyframeId> ids;
   for (int i = 0; i < 6; ++i) ids.push_back(scene.Add(SidewaysPose(0.05 * i)));
   scene.AddLandmarks(0, 400, ids);
-  const MappingResult result = mapper.Process(ids.back());
+  const MappingResult result = mapper.Process(ids.back(), 0);
   EXPECT_GE(result.culled_keyframes, 1);
   EXPECT_EQ(scene.map.keyframes().size(), ids.size() - static_cast<size_t>(result.culled_keyframes));
   EXPECT_TRUE(scene.map.keyframes().Contains(ids.front())) << "the origin stays";
@@ -188,8 +212,8 @@ TEST(LocalMapperTest, ARedundantKeyframeGoesAndItsFramesStay) {
 TEST(LocalMapperTest, ALandmarkThatTrackingDoesNotFindIsCulled) {
   TwoKeyframes two(0.4);
   Map& map = two.scene.map;
-  LocalMapper mapper(two.world.camera(), {}, &map);
-  const MappingResult first = mapper.Process(two.second);
+  LocalMapper mapper(two.world.camera(), {}, &two.scene.shared_map);
+  const MappingResult first = mapper.Process(two.second, 0);
   ASSERT_GT(first.created, 100);
   LandmarkId unfound, unseen;
   map.landmarks().ForEach([&](const Landmark& landmark) {
@@ -202,10 +226,10 @@ TEST(LocalMapperTest, ALandmarkThatTrackingDoesNotFindIsCulled) {
   map.landmarks().At(unfound).visible_count = 1000;
   // Far away, so that nobody sees the other one again.
   const Rigid3 elsewhere(ExpSo3({0, 0.9, 0}), {0, 0, 0});
-  mapper.Process(two.scene.Add(elsewhere));
+  mapper.Process(two.scene.Add(elsewhere), 0);
   EXPECT_FALSE(map.landmarks().Contains(unfound));
   EXPECT_TRUE(map.landmarks().Contains(unseen)) << "still on probation";
-  mapper.Process(two.scene.Add(elsewhere));
+  mapper.Process(two.scene.Add(elsewhere), 0);
   EXPECT_FALSE(map.landmarks().Contains(unseen));
   EXPECT_THAT(map.Validate(), IsEmpty());
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace dynamic_slam {
@@ -12,20 +13,19 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 // A bundle problem made of parts of the map, and the way back.
 class MapBundle {
  public:
-  explicit MapBundle(Map* map)
-      : map_(map),
-        pose_of_(map->keyframes().CreatedCount(), kNone),
-        seen_(map->landmarks().CreatedCount(), 0) {}
+  explicit MapBundle(const Map& map)
+      : epoch_(map.epoch()),
+        pose_of_(map.keyframes().CreatedCount(), kNone),
+        seen_(map.landmarks().CreatedCount(), 0) {}
 
-  void AddPose(KeyframeId id, bool fixed) {
+  void AddPose(const Map& map, KeyframeId id, bool fixed) {
     pose_of_[id.value()] = static_cast<uint32_t>(problem_.poses.size());
-    problem_.poses.push_back({map_->keyframes().At(id).cam_from_world(), fixed});
+    problem_.poses.push_back({map.keyframes().At(id).cam_from_world(), fixed});
     keyframes_.push_back(id);
   }
-  bool HasPose(KeyframeId id) const { return pose_of_[id.value()] != kNone; }
 
-  void AddLandmarksOf(KeyframeId id) {
-    for (const LandmarkId landmark : map_->keyframes().At(id).landmarks()) {
+  void AddLandmarksOf(const Map& map, KeyframeId id) {
+    for (const LandmarkId landmark : map.keyframes().At(id).landmarks()) {
       if (!landmark.IsValid() || seen_[landmark.value()] != 0) continue;
       seen_[landmark.value()] = 1;
       landmarks_.push_back(landmark);
@@ -33,74 +33,107 @@ class MapBundle {
   }
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
-  BundleSummary Solve(const Camera& camera, const BundleOptions& options) {
+  // After all poses and landmarks: what the ones see of the others.
+  void AddObservations(const Map& map) {
     for (const LandmarkId id : landmarks_) {
-      const Landmark& landmark = map_->landmarks().At(id);
+      const Landmark& landmark = map.landmarks().At(id);
       const uint32_t point = static_cast<uint32_t>(problem_.points.size());
       problem_.points.push_back({landmark.position(), false});
       for (const Observation& observation : landmark.observations()) {
         if (!HasPose(observation.keyframe)) continue;
-        const Keypoint& keypoint = map_->keyframes().At(observation.keyframe).keypoint(observation.keypoint);
+        const Keypoint& keypoint = map.keyframes().At(observation.keyframe).keypoint(observation.keypoint);
         problem_.observations.push_back({pose_of_[observation.keyframe.value()],
                                          point,
                                          {keypoint.x, keypoint.y},
-                                         1.0 / map_->octave_scales()[static_cast<size_t>(keypoint.octave)],
+                                         1.0 / map.octave_scales()[static_cast<size_t>(keypoint.octave)],
                                          1.0});
-        links_.push_back(observation);
+        links_.push_back({observation, id});
       }
     }
-    std::vector<uint8_t> is_outlier;
-    const BundleSummary summary = AdjustBundle(camera, options, {}, &problem_, &is_outlier);
-    if (summary.usable) WriteBack(is_outlier);
-    return summary;
   }
 
- private:
-  void WriteBack(const std::vector<uint8_t>& is_outlier) {
+  BundleSummary Solve(const Camera& camera, const BundleOptions& options,
+                      const std::function<bool()>& should_stop) {
+    return AdjustBundle(camera, options, should_stop, &problem_, &is_outlier_);
+  }
+
+  // False, and nothing is changed, when this is not the map any more that the problem was made of.
+  bool WriteBack(Map* map) const {
+    if (map->epoch() != epoch_) return false;
+    MoveYoungerKeyframes(map);
     for (size_t i = 0; i < keyframes_.size(); ++i) {
-      if (!problem_.poses[i].fixed)
-        map_->keyframes().At(keyframes_[i]).set_cam_from_world(problem_.poses[i].cam_from_world);
+      if (problem_.poses[i].fixed) continue;
+      if (Keyframe* keyframe = map->keyframes().Find(keyframes_[i])) {
+        keyframe->set_cam_from_world(problem_.poses[i].cam_from_world);
+      }
     }
     for (size_t i = 0; i < landmarks_.size(); ++i) {
-      map_->landmarks().At(landmarks_[i]).set_position(problem_.points[i].position);
+      if (Landmark* landmark = map->landmarks().Find(landmarks_[i])) {
+        landmark->set_position(problem_.points[i].position);
+      }
     }
-    for (size_t i = 0; i < is_outlier.size(); ++i) {
-      // The landmark may have gone with an earlier link.
-      if (is_outlier[i] != 0 &&
-          map_->keyframes().At(links_[i].keyframe).landmarks()[links_[i].keypoint].IsValid()) {
-        map_->Unlink(links_[i].keyframe, links_[i].keypoint);
+    for (size_t i = 0; i < is_outlier_.size(); ++i) {
+      if (is_outlier_[i] == 0) continue;
+      // The link may have gone with an earlier one of its landmark.
+      const Observation& observation = links_[i].observation;
+      const Keyframe* keyframe = map->keyframes().Find(observation.keyframe);
+      if (keyframe != nullptr && keyframe->landmarks()[observation.keypoint] == links_[i].landmark) {
+        map->Unlink(observation.keyframe, observation.keypoint);
       }
     }
     for (const LandmarkId id : landmarks_) {
-      if (map_->landmarks().Contains(id)) map_->RefreshLandmark(id);
+      if (map->landmarks().Contains(id)) map->RefreshLandmark(id);
     }
+    return true;
   }
 
-  Map* map_;
+ private:
+  struct Link {
+    Observation observation;
+    LandmarkId landmark;
+  };
+
+  bool HasPose(KeyframeId id) const { return id.value() < pose_of_.size() && pose_of_[id.value()] != kNone; }
+
+  // Keyframes that came during the solution keep their place relative to the one they share most with.
+  void MoveYoungerKeyframes(Map* map) const {
+    map->keyframes().ForEach([this, map](Keyframe& keyframe) {
+      if (keyframe.id().value() < pose_of_.size()) return;
+      for (const CovisibleKeyframe& other : keyframe.BestCovisible(keyframe.covisible().size())) {
+        if (!HasPose(other.id)) continue;
+        const BundleProblem::Pose& moved = problem_.poses[pose_of_[other.id.value()]];
+        keyframe.set_cam_from_world(keyframe.cam_from_world() *
+                                    map->keyframes().At(other.id).cam_from_world().Inverse() *
+                                    moved.cam_from_world);
+        return;
+      }
+    });
+  }
+
+  uint32_t epoch_;
   BundleProblem problem_;
+  std::vector<uint8_t> is_outlier_;
   std::vector<uint32_t> pose_of_;  // by keyframe id
   std::vector<uint8_t> seen_;      // by landmark id
   std::vector<KeyframeId> keyframes_;
   std::vector<LandmarkId> landmarks_;
-  std::vector<Observation> links_;  // of the problem's observations
+  std::vector<Link> links_;  // of the problem's observations
 };
 
-}  // namespace
-
-BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId id, Map* map) {
+MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& map) {
   std::vector<KeyframeId> local{id};
   for (const CovisibleKeyframe& other :
-       map->keyframes().At(id).BestCovisible(static_cast<size_t>(options.local_keyframes - 1))) {
+       map.keyframes().At(id).BestCovisible(static_cast<size_t>(options.local_keyframes - 1))) {
     local.push_back(other.id);
   }
   MapBundle bundle(map);
-  for (const KeyframeId keyframe : local) bundle.AddLandmarksOf(keyframe);
+  for (const KeyframeId keyframe : local) bundle.AddLandmarksOf(map, keyframe);
 
-  std::vector<uint8_t> is_local(map->keyframes().CreatedCount(), 0);
+  std::vector<uint8_t> is_local(map.keyframes().CreatedCount(), 0);
   for (const KeyframeId keyframe : local) is_local[keyframe.value()] = 1;
-  std::vector<int> seen_by(map->keyframes().CreatedCount(), 0);
+  std::vector<int> seen_by(map.keyframes().CreatedCount(), 0);
   for (const LandmarkId landmark : bundle.landmarks()) {
-    for (const Observation& observation : map->landmarks().At(landmark).observations()) {
+    for (const Observation& observation : map.landmarks().At(landmark).observations()) {
       if (is_local[observation.keyframe.value()] == 0) ++seen_by[observation.keyframe.value()];
     }
   }
@@ -117,20 +150,55 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
   // does.
   const KeyframeId oldest = *std::min_element(local.begin(), local.end());
   const bool oldest_is_fixed = oldest == KeyframeId(0) || fixed.size() < 2;
-  for (const KeyframeId keyframe : local) bundle.AddPose(keyframe, oldest_is_fixed && keyframe == oldest);
-  for (const KeyframeId keyframe : fixed) bundle.AddPose(keyframe, true);
-  return bundle.Solve(camera, options.local_bundle);
+  for (const KeyframeId keyframe : local) {
+    bundle.AddPose(map, keyframe, oldest_is_fixed && keyframe == oldest);
+  }
+  for (const KeyframeId keyframe : fixed) bundle.AddPose(map, keyframe, true);
+  bundle.AddObservations(map);
+  return bundle;
 }
 
-BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, Map* map) {
+MapBundle WholeBundle(const Map& map) {
   MapBundle bundle(map);
   bool first = true;
-  map->keyframes().ForEach([&](const Keyframe& keyframe) {
-    bundle.AddPose(keyframe.id(), first);
-    bundle.AddLandmarksOf(keyframe.id());
+  map.keyframes().ForEach([&](const Keyframe& keyframe) {
+    bundle.AddPose(map, keyframe.id(), first);
+    bundle.AddLandmarksOf(map, keyframe.id());
     first = false;
   });
-  return bundle.Solve(camera, options.final_bundle);
+  bundle.AddObservations(map);
+  return bundle;
+}
+
+BundleSummary SolveAndWriteBack(const Camera& camera, const BundleOptions& options,
+                                const std::function<bool()>& should_stop, MapBundle* bundle, SharedMap* map) {
+  BundleSummary summary = bundle->Solve(camera, options, should_stop);
+  summary.usable = summary.usable && bundle->WriteBack(map->Write().get());
+  return summary;
+}
+
+}  // namespace
+
+BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId id, uint32_t epoch,
+                          const std::function<bool()>& should_stop, SharedMap* map) {
+  std::optional<MapBundle> bundle;
+  {
+    const auto locked = map->Read();
+    if (locked->epoch() != epoch || locked->keyframes().size() < 2) return {};
+    bundle = LocalBundle(options, id, *locked);
+  }
+  return SolveAndWriteBack(camera, options.local_bundle, should_stop, &*bundle, map);
+}
+
+BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
+                        const std::function<bool()>& should_stop, SharedMap* map) {
+  std::optional<MapBundle> bundle;
+  {
+    const auto locked = map->Read();
+    if (locked->keyframes().size() < 2) return {};
+    bundle = WholeBundle(*locked);
+  }
+  return SolveAndWriteBack(camera, options.final_bundle, should_stop, &*bundle, map);
 }
 
 }  // namespace dynamic_slam

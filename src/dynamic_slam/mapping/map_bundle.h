@@ -1,17 +1,25 @@
 #pragma once
 
+#include <functional>
+
 #include "dynamic_slam/geometry/camera.h"
-#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 
 namespace dynamic_slam {
 
+// Both copy what they need out of the map, solve while others go on with it, and write back unless the map's
+// epoch is not `epoch` (any more): then the summary is not usable. Links that do not fit are broken.
+// Keyframes that were inserted meanwhile move with those that they are linked to. `should_stop` may be empty;
+// it is asked between steps.
+
 // Bundle adjustment of the keyframe, its best neighbours and all they see; others that see it too stay fixed.
-// Links that do not fit are broken.
-BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe, Map* map);
+BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
+                          uint32_t epoch, const std::function<bool()>& should_stop, SharedMap* map);
 
 // The same of the whole map, the oldest keyframe fixed.
-BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, Map* map);
+BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
+                        const std::function<bool()>& should_stop, SharedMap* map);
 
 }  // namespace dynamic_slam

@@ -13,6 +13,7 @@ struct MapperOptions {
   int local_keyframes = 30;
   int fixed_keyframes = 40;
   double redundant_ratio = 0.9;
+  int interrupting_keyframes = 1;
   BundleOptions local_bundle;
   BundleOptions final_bundle{.max_iterations = 20, .refine_iterations = 20, .function_tolerance = 1e-5};
 
@@ -39,6 +40,8 @@ struct MapperOptions {
         "redundant_ratio", self.redundant_ratio,
         OptionField{"", 0.1, 1,
                     "A keyframe is culled when this part of its landmarks is seen as well by three others."});
+    visit("interrupting_keyframes", self.interrupting_keyframes,
+          OptionField{"", 1, 1000, "Local bundle adjustment ends early when so many keyframes wait."});
     visit("local_bundle", self.local_bundle);
     visit("final_bundle", self.final_bundle);
   }

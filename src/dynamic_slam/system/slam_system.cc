@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
@@ -21,27 +22,35 @@ const Camera& Validated(const Camera& camera, const SystemOptions& options) {
 
 }  // namespace
 
-SlamSystem::SlamSystem(const Camera& camera, const SystemOptions& options)
+const char* Name(RunMode mode) { return mode == RunMode::kOffline ? "offline" : "realtime"; }
+
+SlamSystem::SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode)
+    : SlamSystem(camera, options, mode,
+                 mode == RunMode::kOffline ? MakeInlineExecutor() : MakeThreadedExecutor()) {}
+
+SlamSystem::SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode,
+                       std::unique_ptr<Executor> executor)
     : camera_(Validated(camera, options)),
       options_(options),
+      mode_(mode),
       map_(OctaveScales(options.orb)),
       tracker_(camera, options.orb, options.tracker, options.seed, &map_),
-      mapper_(camera, options.mapper, &map_) {}
+      mapper_(camera, options.mapper, &map_),
+      executor_(std::move(executor)) {}
 
 FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
+  DS_CHECK(!is_stopped_, "the system was stopped: Reset() first");
   DS_CHECK(grey.type() == CV_8UC1 && grey.cols == camera_.width && grey.rows == camera_.height,
            "image {} x {} type {}, camera {} x {}", grey.cols, grey.rows, grey.type(), camera_.width,
            camera_.height);
+  executor_->ThrowIfFailed();
   FrameResult result;
   result.id = FrameId(frame_count_++);
-  auto start = std::chrono::steady_clock::now();
-  result.tracking = tracker_.Track(result.id, timestamp_s, grey, mask);
+  const auto start = std::chrono::steady_clock::now();
+  result.tracking = tracker_.Track(result.id, timestamp_s, grey, mask, executor_->Waiting(Lane::kMapping));
   result.tracking_ms = MillisecondsSince(start);
 
-  if (result.tracking.map_was_reset) {
-    mapper_.Reset();
-    tracked_.clear();
-  }
+  if (result.tracking.map_was_reset) tracked_.clear();
   if (result.tracking.state == TrackingState::kTracking) {
     const Frame& frame = tracker_.frame();
     for (const EarlierFrame& earlier : result.tracking.earlier_frames) {
@@ -49,22 +58,59 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const c
     }
     tracked_.push_back({timestamp_s, frame.reference, frame.cam_from_reference, true});
   }
-  start = std::chrono::steady_clock::now();
-  for (const KeyframeId keyframe : result.tracking.new_keyframes) mapper_.Process(keyframe);
-  result.mapping_ms = MillisecondsSince(start);
+  for (const KeyframeId keyframe : result.tracking.new_keyframes) {
+    executor_->Post(Lane::kMapping,
+                    [this, keyframe, epoch = result.tracking.map_epoch](const std::stop_token& token) {
+                      MapKeyframe(keyframe, epoch, token);
+                    });
+  }
+  result.keyframes_waiting = executor_->Waiting(Lane::kMapping);
   return result;
 }
 
-void SlamSystem::Finish() {
-  if (options_.final_bundle) mapper_.Finish();
+void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token) {
+  const auto start = std::chrono::steady_clock::now();
+  const MappingResult result = mapper_.Process(keyframe, epoch, [this, &token] {
+    return token.stop_requested() ||
+           executor_->Waiting(Lane::kMapping) >= options_.mapper.interrupting_keyframes;
+  });
+  auto report = mapping_report_.Write();
+  report->times_ms.push_back(MillisecondsSince(start));
+  report->landmarks_created += result.created;
+  report->landmarks_culled += result.culled_landmarks;
+  report->landmarks_merged += result.merged_landmarks;
+  report->keyframes_culled += result.culled_keyframes;
+  report->bundles_stopped += result.bundle.stopped;
+  report->keyframes_abandoned += result.abandoned;
+}
+
+BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
+  if (is_stopped_) return {};
+  executor_->Drain();
+  return options_.final_bundle ? mapper_.Finish(should_stop) : BundleSummary();
+}
+
+void SlamSystem::Stop() {
+  executor_->Cancel();
+  is_stopped_ = true;
+}
+
+void SlamSystem::Reset() {
+  executor_->Cancel();
+  tracker_.Reset();
+  tracked_.clear();
+  *mapping_report_.Write() = MappingReport();
+  frame_count_ = 0;
+  is_stopped_ = false;
 }
 
 Trajectory SlamSystem::FrameTrajectory() const {
   Trajectory trajectory;
   trajectory.reserve(tracked_.size());
+  const auto map = map_.Read();
   for (const TrackedFrame& frame : tracked_) {
     trajectory.push_back(
-        {frame.timestamp_s, map_.PoseFromReference(frame.reference, frame.cam_from_reference).Inverse()});
+        {frame.timestamp_s, map->PoseFromReference(frame.reference, frame.cam_from_reference).Inverse()});
   }
   return trajectory;
 }
@@ -76,7 +122,7 @@ size_t SlamSystem::LiveFrameCount() const {
 
 Trajectory SlamSystem::KeyframeTrajectory() const {
   Trajectory trajectory;
-  map_.keyframes().ForEach([&trajectory](const Keyframe& keyframe) {
+  map_.Read()->keyframes().ForEach([&trajectory](const Keyframe& keyframe) {
     trajectory.push_back({keyframe.timestamp_s(), keyframe.cam_from_world().Inverse()});
   });
   return trajectory;

@@ -1,41 +1,73 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
-#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/local_mapper.h"
+#include "dynamic_slam/system/executor.h"
 #include "dynamic_slam/system/system_options.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
 
+enum class RunMode {
+  kOffline,   // one thread, one fixed order of the stages: the same input gives the same bytes
+  kRealtime,  // the stages beside tracking in threads of their own
+};
+
+const char* Name(RunMode mode);
+
 // What became of one image, and how long it took.
 struct FrameResult {
   FrameId id;
   TrackingResult tracking;
-  double tracking_ms = 0;  // from the image in memory to its pose
-  double mapping_ms = 0;   // of the mapping that ran because of it
+  double tracking_ms = 0;     // from the image in memory to its pose
+  int keyframes_waiting = 0;  // for local mapping, when the frame was done
 };
 
-// Dynamic-SLAM in offline mode: every frame, one thread, one fixed order of the stages, so that the same
-// images, options and binary give the same map bit by bit.
+// What local mapping has done so far.
+struct MappingReport {
+  std::vector<double> times_ms;  // of each keyframe
+  int landmarks_created = 0, landmarks_culled = 0, landmarks_merged = 0;
+  int keyframes_culled = 0;
+  int bundles_stopped = 0;      // adjustments that ended early, since keyframes were waiting
+  int keyframes_abandoned = 0;  // whose map was given up
+};
+
+// Dynamic-SLAM. All calls come from one thread; in realtime mode the stages beside tracking have their own.
+//
+// What a stage throws reaches the caller by the next call of Process or Finish. After that, and after Stop(),
+// the results so far can be read; Reset() makes the system as new.
 class SlamSystem {
  public:
   // Throws InputError when the camera or an option is out of range.
-  SlamSystem(const Camera& camera, const SystemOptions& options);
+  SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode = RunMode::kOffline);
+  // The stages beside tracking run where the executor puts them.
+  SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode,
+             std::unique_ptr<Executor> executor);
 
   // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of that size, not 0 where keypoints are
   // forbidden.
   FrameResult Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask = {});
 
-  // To be called once after the last image; adjusts the whole map. Poses and landmarks are final after it.
-  void Finish();
+  // To be called after the last image: waits for the stages, then adjusts the whole map. Poses and landmarks
+  // are final after it. `should_stop` may be empty; when it says so, the adjustment ends with what it has.
+  // Does nothing after Stop().
+  BundleSummary Finish(const std::function<bool()>& should_stop = {});
+
+  // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
+  // images after that.
+  void Stop();
+
+  // Forgets all images and the map.
+  void Reset();
 
   // The frames that have a pose, at where the map puts them now.
   Trajectory FrameTrajectory() const;
@@ -44,7 +76,9 @@ class SlamSystem {
   // Frames of FrameTrajectory that had their pose when their turn came.
   size_t LiveFrameCount() const;
 
-  const Map& map() const { return map_; }
+  MappingReport mapping_report() const { return *mapping_report_.Read(); }
+  RunMode mode() const { return mode_; }
+  const SharedMap& map() const { return map_; }
   const Camera& camera() const { return camera_; }
   const SystemOptions& options() const { return options_; }
 
@@ -57,13 +91,19 @@ class SlamSystem {
     bool is_live;  // not given its pose by a later frame
   };
 
+  void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
+
   Camera camera_;
   SystemOptions options_;
-  Map map_;
+  RunMode mode_;
+  SharedMap map_;
   Tracker tracker_;
   LocalMapper mapper_;
+  Guarded<MappingReport> mapping_report_;
   std::vector<TrackedFrame> tracked_;
   uint32_t frame_count_ = 0;
+  bool is_stopped_ = false;
+  std::unique_ptr<Executor> executor_;  // last: its tasks use all the others
 };
 
 }  // namespace dynamic_slam

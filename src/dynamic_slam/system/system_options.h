@@ -18,7 +18,8 @@ struct SystemOptions {
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
-    visit("seed", self.seed, OptionField{"", 0, 0, "Seed of everything random: the same seed gives the same bytes."});
+    visit("seed", self.seed,
+          OptionField{"", 0, 0, "Seed of everything random: the same seed gives the same bytes."});
     visit("final_bundle", self.final_bundle,
           OptionField{"", 0, 1, "Adjust the whole map once more when the sequence is over."});
     visit("orb", self.orb);

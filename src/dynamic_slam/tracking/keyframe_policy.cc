@@ -28,8 +28,12 @@ KeyframeReason DecideKeyframe(const KeyframePolicyInput& input, const KeyframePo
   if (input.inliers < options.min_inliers || input.frames_since_keyframe < options.min_frames) {
     return KeyframeReason::kNone;
   }
+  const bool is_poor = input.inliers < kFewInliers;
+  if (input.keyframes_waiting >= (is_poor ? options.max_waiting_when_poor : options.max_waiting)) {
+    return KeyframeReason::kNone;
+  }
   if (input.inliers < options.max_tracked_ratio * input.most_inliers) return KeyframeReason::kNewView;
-  if (input.inliers < kFewInliers) return KeyframeReason::kFewInliers;
+  if (is_poor) return KeyframeReason::kFewInliers;
   if (input.frames_since_keyframe >= options.max_frames) return KeyframeReason::kTime;
   return KeyframeReason::kNone;
 }

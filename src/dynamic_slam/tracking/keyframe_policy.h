@@ -6,8 +6,9 @@ namespace dynamic_slam {
 
 struct KeyframePolicyInput {
   int frames_since_keyframe = 0;
-  int inliers = 0;       // landmarks that the frame tracks
-  int most_inliers = 0;  // the most that a frame since the last keyframe did
+  int inliers = 0;            // landmarks that the frame tracks
+  int most_inliers = 0;       // the most that a frame since the last keyframe did
+  int keyframes_waiting = 0;  // that local mapping has not come to yet
 };
 
 enum class KeyframeReason {

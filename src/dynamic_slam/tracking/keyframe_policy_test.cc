@@ -25,6 +25,11 @@ TEST(KeyframePolicyTest, Decides) {
       {"long ago", {30, 200, 200}, KeyframeReason::kTime},
       {"not quite so long ago", {29, 200, 200}, KeyframeReason::kNone},
       {"long ago, but doubtful", {300, 14, 14}, KeyframeReason::kNone},
+      {"mapping is behind", {10, 100, 200, 3}, KeyframeReason::kNone},
+      {"mapping is a little behind", {10, 100, 200, 2}, KeyframeReason::kNewView},
+      {"mapping is behind, but there is danger", {10, 49, 200, 4}, KeyframeReason::kNewView},
+      {"mapping is so far behind that danger does not count", {10, 49, 200, 5}, KeyframeReason::kNone},
+      {"long ago, and mapping is behind", {30, 200, 200, 3}, KeyframeReason::kNone},
       {"the loss of view is the first reason", {30, 20, 200}, KeyframeReason::kNewView},
   };
   for (const Case& c : cases) EXPECT_STREQ(Name(DecideKeyframe(c.input, kOptions)), Name(c.reason)) << c.what;

@@ -11,7 +11,8 @@ constexpr double kKeyframeRatio = 0.85;
 
 }  // namespace
 
-PoseTracker::PoseTracker(const Camera& camera, const TrackerOptions& options, std::vector<float> octave_scales)
+PoseTracker::PoseTracker(const Camera& camera, const TrackerOptions& options,
+                         std::vector<float> octave_scales)
     : camera_(camera),
       options_(options),
       octave_scales_(std::move(octave_scales)),
@@ -61,7 +62,8 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
   for (const Match& match : matches) {
     const LandmarkId landmark = keyframe.landmarks()[match.first];
     candidates_.push_back({match.second, landmark, map.landmarks().At(landmark).position()});
-    rotation_.Add(keyframe.keypoint(match.first).angle_rad, frame->features.keypoints[match.second].angle_rad);
+    rotation_.Add(keyframe.keypoint(match.first).angle_rad,
+                  frame->features.keypoints[match.second].angle_rad);
   }
   AcceptCandidates(frame);
 
@@ -112,10 +114,12 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
     if (landmark_known_[view.ids[i].value()] != 0) continue;
     const float scale = octave_scales_[static_cast<size_t>(projection.octave)];
     const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
-                              static_cast<float>(radius_px) * scale, projection.octave - 1, projection.octave + 1};
+                              static_cast<float>(radius_px) * scale, projection.octave - 1,
+                              projection.octave + 1};
     const WindowMatch match = FindInWindow(frame->features, frame->grid, window, view.descriptors[i], taken_);
     if (match.distance > kLooseDistance) continue;
-    if (match.octave == match.second_octave && match.distance > kWindowRatio * match.second_distance) continue;
+    if (match.octave == match.second_octave && match.distance > kWindowRatio * match.second_distance)
+      continue;
     taken_[match.keypoint] = 1;
     frame->landmarks[match.keypoint] = view.ids[i];
     frame->points[match.keypoint] = view.positions[i];

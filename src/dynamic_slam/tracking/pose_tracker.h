@@ -15,14 +15,15 @@
 
 namespace dynamic_slam {
 
-// Finds a frame's pose from landmarks: matching, then Eq. (10). Each Track* leaves the pose and the landmarks that fit
-// it in the frame and returns their number.
+// Finds a frame's pose from landmarks: matching, then Eq. (10). Each Track* leaves the pose and the landmarks
+// that fit it in the frame and returns their number.
 class PoseTracker {
  public:
   PoseTracker(const Camera& camera, const TrackerOptions& options, std::vector<float> octave_scales);
 
   // Looks for the last frame's landmarks about where `predicted` puts them.
-  int TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_from_world, double radius_px, Frame* frame);
+  int TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_from_world, double radius_px,
+                     Frame* frame);
 
   // Matches descriptors with the keyframe's and solves PnP: needs no idea of the pose.
   int TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Random& random, Frame* frame);

@@ -14,6 +14,9 @@ constexpr double kRelocalisedSearch = 3.0;
 
 constexpr int kLocalMapPasses = 2;
 
+// A motion is not carried on for longer than so many times the time in which it was seen.
+constexpr double kMaxPredictionSteps = 5;
+
 // An uncertain start is believed after so many frames without a better one.
 constexpr uint32_t kMaxReviews = 60;
 
@@ -39,17 +42,19 @@ const char* Name(TrackingState state) {
 }
 
 Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
-                 Map* map)
+                 SharedMap* map)
     : orb_options_(orb),
       options_(options),
       map_(map),
+      octave_scales_(map->Read()->octave_scales()),
       bounds_(camera.IdealBounds()),
       extractor_(orb, camera),
-      initializer_(camera, options.initializer, map->octave_scales()),
-      pose_tracker_(camera, options, map->octave_scales()),
+      initializer_(camera, options.initializer, octave_scales_),
+      pose_tracker_(camera, options, octave_scales_),
       random_(seed) {}
 
-TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
+TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask,
+                              int keyframes_waiting) {
   std::swap(frame_, last_);
   frame_.id = id;
   frame_.timestamp_s = timestamp_s;
@@ -74,13 +79,16 @@ TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& gre
       lost_frames_ = 0;
       CountVisibility();
       frame_.reference = view_.reference;
-      frame_.cam_from_reference =
-          frame_.cam_from_world * map_->keyframes().At(frame_.reference).cam_from_world().Inverse();
-      velocity_ = last_has_pose_
-                      ? std::optional<Rigid3>(frame_.cam_from_world * last_.cam_from_world.Inverse())
-                      : std::nullopt;
+      frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
+      velocity_.reset();
+      if (last_has_pose_) {
+        velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
+        velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
+      }
       if (!start_is_certain_) ReviewStart(&result);
-      if (state_ == TrackingState::kTracking && !result.map_was_reset) InsertKeyframeIfDue(&result);
+      if (state_ == TrackingState::kTracking && !result.map_was_reset) {
+        InsertKeyframeIfDue(keyframes_waiting, &result);
+      }
     } else {
       velocity_.reset();
       ++lost_frames_;
@@ -101,7 +109,15 @@ void Tracker::Initialise(TrackingResult* result) {
 }
 
 void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) {
-  result->earlier_frames = initializer_.BuildMap(proposal, &frame_, map_);
+  {
+    auto map = map_->Write();
+    result->earlier_frames = initializer_.BuildMap(proposal, &frame_, map.get());
+    result->map_epoch = map->epoch();
+    result->new_keyframes.clear();
+    map->keyframes().ForEach(
+        [result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
+    inliers_ = map->keyframes().At(frame_.reference).LandmarkCount();
+  }
   start_is_certain_ = proposal.is_certain;
   if (start_is_certain_) initializer_.Reset();
   state_ = TrackingState::kTracking;
@@ -111,11 +127,7 @@ void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) 
   last_keyframe_ = frame_.reference;
   last_keyframe_frame_ = frame_.id;
   most_inliers_ = 0;
-  inliers_ = map_->keyframes().At(last_keyframe_).LandmarkCount();
   result->keyframe_reason = KeyframeReason::kStart;
-  result->new_keyframes.clear();
-  map_->keyframes().ForEach(
-      [result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
 }
 
 void Tracker::ReviewStart(TrackingResult* result) {
@@ -142,7 +154,8 @@ void Tracker::ReviewStart(TrackingResult* result) {
 }
 
 void Tracker::EmptyMap(TrackingResult* result) {
-  *map_ = Map(map_->octave_scales());
+  map_->Write()->Reset();
+  visibility_.Clear();
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
   last_has_pose_ = false;
@@ -152,21 +165,37 @@ void Tracker::EmptyMap(TrackingResult* result) {
   inliers_ = 0;
 }
 
+void Tracker::Reset() {
+  TrackingResult ignored;
+  EmptyMap(&ignored);
+  initializer_.Reset();
+}
+
 // Local mapping may have moved, merged or erased what the last frame saw, and added to it.
 void Tracker::RefreshLastFrame() {
-  last_.cam_from_world = map_->PoseFromReference(last_.reference, last_.cam_from_reference);
-  const Keyframe* keyframe = map_->keyframes().Find(last_keyframe_);
+  const auto map = map_->Read();
+  last_.cam_from_world = map->PoseFromReference(last_.reference, last_.cam_from_reference);
+  const Keyframe* keyframe = map->keyframes().Find(last_keyframe_);
   if (keyframe != nullptr && keyframe->frame_id() == last_.id) last_.landmarks = keyframe->landmarks();
   for (size_t i = 0; i < last_.landmarks.size(); ++i) {
     if (!last_.landmarks[i].IsValid()) continue;
-    last_.landmarks[i] = map_->Resolve(last_.landmarks[i]);
-    if (last_.landmarks[i].IsValid()) last_.points[i] = map_->landmarks().At(last_.landmarks[i]).position();
+    last_.landmarks[i] = map->Resolve(last_.landmarks[i]);
+    if (last_.landmarks[i].IsValid()) last_.points[i] = map->landmarks().At(last_.landmarks[i]).position();
   }
+}
+
+// Goes on as the camera went between the last two frames, for as long as this one took to come.
+Rigid3 Tracker::PredictPose() const {
+  if (!velocity_.has_value()) return last_.cam_from_world;
+  const double dt_s = frame_.timestamp_s - last_.timestamp_s;
+  const double steps = velocity_dt_s_ > 0 ? std::clamp(dt_s / velocity_dt_s_, 0.0, kMaxPredictionSteps) : 1;
+  const Rigid3 motion(ExpSo3(steps * LogSo3(velocity_->rotation)), steps * velocity_->translation);
+  return motion * last_.cam_from_world;
 }
 
 bool Tracker::TrackFrame() {
   RefreshLastFrame();
-  const Rigid3 predicted = velocity_.has_value() ? *velocity_ * last_.cam_from_world : last_.cam_from_world;
+  const Rigid3 predicted = PredictPose();
   int inliers = pose_tracker_.TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
   if (inliers < options_.min_motion_inliers) {
     inliers = pose_tracker_.TrackFromFrame(last_, last_.cam_from_world,
@@ -181,7 +210,7 @@ bool Tracker::TrackFrame() {
 }
 
 bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
-  view_builder_.Build(*map_, frame_.landmarks, options_.local_keyframes, &view_);
+  view_builder_.Build(*map_->Read(), frame_.landmarks, options_.local_keyframes, &view_);
   if (!view_.reference.IsValid()) return false;
   // The second time from the better pose finds what the first one just missed.
   for (int pass = 0; pass < kLocalMapPasses; ++pass) {
@@ -195,17 +224,21 @@ bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
 // The youngest keyframes first: the camera was there a moment ago.
 bool Tracker::Relocalise() {
   std::vector<KeyframeId> candidates;
-  map_->keyframes().ForEach([&candidates](const Keyframe& keyframe) { candidates.push_back(keyframe.id()); });
+  map_->Read()->keyframes().ForEach(
+      [&candidates](const Keyframe& keyframe) { candidates.push_back(keyframe.id()); });
   const size_t count = std::min(candidates.size(), static_cast<size_t>(options_.relocalisation_keyframes));
   const std::string why_lost = reason_;
   for (size_t i = 0; i < count; ++i) {
-    const Keyframe& keyframe = map_->keyframes().At(candidates[candidates.size() - 1 - i]);
-    if (pose_tracker_.TrackFromKeyframe(*map_, keyframe, random_, &frame_) < options_.pnp.min_inliers)
-      continue;
+    const KeyframeId candidate = candidates[candidates.size() - 1 - i];
+    int inliers = 0;
+    if (const auto map = map_->Read(); const Keyframe* keyframe = map->keyframes().Find(candidate)) {
+      inliers = pose_tracker_.TrackFromKeyframe(*map, *keyframe, random_, &frame_);
+    }
+    if (inliers < options_.pnp.min_inliers) continue;
     if (!TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, options_.min_inliers)) continue;
     // Once more from the better pose, with the narrow window.
     if (TrackLocalMap(options_.local_map_radius_px, options_.min_relocalisation_inliers)) {
-      reason_ = fmt::format("found again by keyframe {}", keyframe.id().value());
+      reason_ = fmt::format("found again by keyframe {}", candidate.value());
       return true;
     }
   }
@@ -219,26 +252,49 @@ bool Tracker::Relocalise() {
 
 void Tracker::CountVisibility() {
   for (size_t i = 0; i < view_.size(); ++i) {
-    if (in_view_[i] != 0) ++map_->landmarks().At(view_.ids[i]).visible_count;
+    if (in_view_[i] != 0) visibility_.visible.push_back(view_.ids[i]);
   }
   for (const LandmarkId id : frame_.landmarks) {
-    if (!id.IsValid()) continue;
-    Landmark& landmark = map_->landmarks().At(id);
-    ++landmark.found_count;
-    landmark.visible_count =
-        std::max(landmark.visible_count, landmark.found_count);  // found where not expected
+    if (id.IsValid()) visibility_.found.push_back(id);
   }
 }
 
-void Tracker::InsertKeyframeIfDue(TrackingResult* result) {
+void VisibilityLog::ApplyTo(Map* map) {
+  for (const LandmarkId id : visible) {
+    if (const LandmarkId now = map->Resolve(id); now.IsValid()) ++map->landmarks().At(now).visible_count;
+  }
+  for (const LandmarkId id : found) {
+    const LandmarkId now = map->Resolve(id);
+    if (!now.IsValid()) continue;
+    Landmark& landmark = map->landmarks().At(now);
+    ++landmark.found_count;
+    // Also found where it was not expected.
+    landmark.visible_count = std::max(landmark.visible_count, landmark.found_count);
+  }
+  Clear();
+}
+
+void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result) {
   most_inliers_ = std::max(most_inliers_, inliers_);
   KeyframePolicyInput input;
   input.frames_since_keyframe = static_cast<int>(frame_.id.value() - last_keyframe_frame_.value());
   input.inliers = inliers_;
   input.most_inliers = most_inliers_;
+  input.keyframes_waiting = keyframes_waiting;
   result->keyframe_reason = DecideKeyframe(input, options_.keyframe);
   if (result->keyframe_reason == KeyframeReason::kNone) return;
-  last_keyframe_ = InsertKeyframe(frame_, map_);
+  {
+    auto map = map_->Write();
+    visibility_.ApplyTo(map.get());
+    // What the frame's pose is relative to may have moved since the view was made.
+    const Map::Anchor anchor = map->ResolveKeyframe(frame_.reference);
+    if (anchor.keyframe != frame_.reference ||
+        map->keyframes().At(anchor.keyframe).cam_from_world() != view_.reference_from_world) {
+      frame_.cam_from_world = map->PoseFromReference(frame_.reference, frame_.cam_from_reference);
+    }
+    last_keyframe_ = InsertKeyframe(frame_, map.get());
+    result->map_epoch = map->epoch();
+  }
   last_keyframe_frame_ = frame_.id;
   most_inliers_ = 0;
   frame_.reference = last_keyframe_;
@@ -248,12 +304,11 @@ void Tracker::InsertKeyframeIfDue(TrackingResult* result) {
 
 // A map that lost the camera so soon was probably wrong from the start.
 void Tracker::GiveUpSmallMap(TrackingResult* result) {
-  if (static_cast<int>(map_->keyframes().size()) > options_.reset_keyframes ||
-      lost_frames_ < options_.reset_after_frames) {
-    return;
-  }
-  reason_ = fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_,
-                        map_->keyframes().size());
+  if (lost_frames_ < options_.reset_after_frames) return;
+  const size_t keyframes = map_->Read()->keyframes().size();
+  if (static_cast<int>(keyframes) > options_.reset_keyframes) return;
+  reason_ =
+      fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_, keyframes);
   EmptyMap(result);
   initializer_.Reset();
 }

@@ -11,7 +11,7 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/local_view.h"
-#include "dynamic_slam/map/map.h"
+#include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/tracking/initializer.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
 #include "dynamic_slam/tracking/pose_tracker.h"
@@ -35,20 +35,36 @@ struct TrackingResult {
   int inliers = 0;  // landmarks that fit the pose
   KeyframeReason keyframe_reason = KeyframeReason::kNone;
   std::vector<KeyframeId> new_keyframes;     // inserted into the map, waiting for local mapping
+  uint32_t map_epoch = 0;                    // of the map that they belong to
   std::vector<EarlierFrame> earlier_frames;  // that have a pose since the map was made
   bool map_was_reset = false;
 };
 
-// From images to poses: a state machine over initialisation, tracking and being lost. Synchronous; the map
-// belongs to it during Track().
+// Which landmarks were to be seen in frames, and which were found; the map is told with the next keyframe.
+struct VisibilityLog {
+  std::vector<LandmarkId> visible, found;
+
+  void ApplyTo(Map* map);  // and empties itself
+  void Clear() {
+    visible.clear();
+    found.clear();
+  }
+};
+
+// From images to poses: a state machine over initialisation, tracking and being lost. Synchronous; looks at
+// the map for moments only, and takes it for granted that others change it in between.
 class Tracker {
  public:
   Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
-          Map* map);
+          SharedMap* map);
 
   // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden (Eq.
-  // 11).
-  TrackingResult Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask);
+  // 11). keyframes_waiting: those that local mapping has not come to yet.
+  TrackingResult Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask,
+                       int keyframes_waiting = 0);
+
+  // Forgets everything, and empties the map.
+  void Reset();
 
   // The frame of the last Track(); its pose holds when the state is kTracking.
   const Frame& frame() const { return frame_; }
@@ -63,13 +79,15 @@ class Tracker {
   bool Relocalise();
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
+  Rigid3 PredictPose() const;
   void CountVisibility();
-  void InsertKeyframeIfDue(TrackingResult* result);
+  void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
   void GiveUpSmallMap(TrackingResult* result);
 
   OrbOptions orb_options_;
   TrackerOptions options_;
-  Map* map_;
+  SharedMap* map_;
+  std::vector<float> octave_scales_;
   std::array<double, 4> bounds_;
   OrbExtractor extractor_;
   Initializer initializer_;
@@ -82,6 +100,7 @@ class Tracker {
   bool last_has_pose_ = false;
   bool start_is_certain_ = true;
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
+  double velocity_dt_s_ = 0;        // the time between these two
   KeyframeId last_keyframe_;
   FrameId last_keyframe_frame_;
   FrameId start_frame_;
@@ -91,6 +110,7 @@ class Tracker {
   std::string reason_;
   LocalView view_;
   std::vector<uint8_t> in_view_;
+  VisibilityLog visibility_;
 };
 
 }  // namespace dynamic_slam

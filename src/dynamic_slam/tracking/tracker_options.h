@@ -20,13 +20,15 @@ struct InitializerOptions {
     visit("feature_factor", self.feature_factor,
           OptionField{"", 1, 10, "Times the usual number of keypoints until the map is initialised."});
     visit("min_matches", self.min_matches,
-          OptionField{"", 20, 5000, "With fewer matches to the reference frame, the current frame takes its place."});
+          OptionField{"", 20, 5000,
+                      "With fewer matches to the reference frame, the current frame takes its place."});
     visit("search_radius_px", self.search_radius_px,
           OptionField{"px", 5, 1000, "How far from its last place a keypoint is looked for."});
     visit("max_octave", self.max_octave,
           OptionField{"", 0, 11, "Coarser keypoints are too inaccurate to initialise with."});
     visit("max_cost_ratio", self.max_cost_ratio,
-          OptionField{"", 0, 1, "Of two motions that fit, the errors of the better over those of the other, at most."});
+          OptionField{"", 0, 1,
+                      "Of two motions that fit, the errors of the better over those of the other, at most."});
     visit("two_view", self.two_view);
   }
 };
@@ -36,16 +38,25 @@ struct KeyframePolicyOptions {
   int min_frames = 1;
   int max_frames = 30;
   int min_inliers = 15;
+  int max_waiting = 3;
+  int max_waiting_when_poor = 5;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
-    visit("max_tracked_ratio", self.max_tracked_ratio,
-          OptionField{"", 0.1, 1,
-                      "A frame that tracks less than this part of the most since the last keyframe shows new things."});
+    visit(
+        "max_tracked_ratio", self.max_tracked_ratio,
+        OptionField{
+            "", 0.1, 1,
+            "A frame that tracks less than this part of the most since the last keyframe shows new things."});
     visit("min_frames", self.min_frames, OptionField{"", 1, 1000, "Frames between two keyframes at least."});
-    visit("max_frames", self.max_frames, OptionField{"", 1, 10000, "After so many frames a keyframe is due."});
+    visit("max_frames", self.max_frames,
+          OptionField{"", 1, 10000, "After so many frames a keyframe is due."});
     visit("min_inliers", self.min_inliers,
           OptionField{"", 4, 1000, "A frame with fewer inliers is too uncertain to become a keyframe."});
+    visit("max_waiting", self.max_waiting,
+          OptionField{"", 1, 100, "With so many keyframes waiting for local mapping, no more are made."});
+    visit("max_waiting_when_poor", self.max_waiting_when_poor,
+          OptionField{"", 1, 100, "The same for frames with few inliers, which new landmarks could save."});
   }
 };
 
@@ -67,20 +78,23 @@ struct TrackerOptions {
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("motion_radius_px", self.motion_radius_px,
-          OptionField{"px", 1, 200, "Search radius about the place that the motion model predicts, in octave 0."});
+          OptionField{"px", 1, 200,
+                      "Search radius about the place that the motion model predicts, in octave 0."});
     visit("local_map_radius_px", self.local_map_radius_px,
           OptionField{"px", 0.5, 100, "Search radius about a local landmark's projection, in octave 0."});
     visit("min_motion_inliers", self.min_motion_inliers,
           OptionField{"", 4, 1000, "Inliers that a first guess of the pose needs."});
-    visit("min_inliers", self.min_inliers, OptionField{"", 4, 1000, "Inliers with less than which the camera is lost."});
+    visit("min_inliers", self.min_inliers,
+          OptionField{"", 4, 1000, "Inliers with less than which the camera is lost."});
     visit("min_relocalisation_inliers", self.min_relocalisation_inliers,
           OptionField{"", 4, 1000, "Inliers that it takes to be found again."});
     visit("local_keyframes", self.local_keyframes,
           OptionField{"", 2, 1000, "Keyframes whose landmarks make the local map."});
     visit("relocalisation_keyframes", self.relocalisation_keyframes,
           OptionField{"", 1, 1000, "Keyframes tried on each frame while lost."});
-    visit("reset_keyframes", self.reset_keyframes,
-          OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
+    visit(
+        "reset_keyframes", self.reset_keyframes,
+        OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
     visit("reset_after_frames", self.reset_after_frames,
           OptionField{"", 1, 10000, "Lost frames after which such a small map is given up."});
     visit("initializer", self.initializer);

@@ -1,0 +1,54 @@
+#include "dynamic_slam/system/executor.h"
+
+#include <array>
+
+namespace dynamic_slam {
+namespace {
+
+class InlineExecutor : public Executor {
+ public:
+  void Post(Lane, Task task) override { task(std::stop_token()); }
+  int Waiting(Lane) const override { return 0; }
+  void Drain() override {}
+  void Cancel() override {}
+  void ThrowIfFailed() const override {}
+};
+
+class ThreadedExecutor : public Executor {
+ public:
+  ThreadedExecutor() {
+    for (const Lane lane : kLanes) workers_[Index(lane)] = std::make_unique<Worker>(Name(lane));
+  }
+  void Post(Lane lane, Task task) override { workers_[Index(lane)]->Post(std::move(task)); }
+  int Waiting(Lane lane) const override { return static_cast<int>(workers_[Index(lane)]->Waiting()); }
+  void Drain() override {
+    for (const auto& worker : workers_) worker->Drain();
+  }
+  void Cancel() override {
+    for (const auto& worker : workers_) worker->Cancel();
+  }
+  void ThrowIfFailed() const override {
+    for (const auto& worker : workers_) worker->ThrowIfFailed();
+  }
+
+ private:
+  static size_t Index(Lane lane) { return static_cast<size_t>(lane); }
+
+  std::array<std::unique_ptr<Worker>, std::size(kLanes)> workers_;
+};
+
+}  // namespace
+
+const char* Name(Lane lane) {
+  switch (lane) {
+    case Lane::kMapping:
+      return "mapping";
+  }
+  return "";
+}
+
+std::unique_ptr<Executor> MakeInlineExecutor() { return std::make_unique<InlineExecutor>(); }
+
+std::unique_ptr<Executor> MakeThreadedExecutor() { return std::make_unique<ThreadedExecutor>(); }
+
+}  // namespace dynamic_slam

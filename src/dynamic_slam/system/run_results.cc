@@ -1,0 +1,150 @@
+#include "dynamic_slam/system/run_results.h"
+
+#include <algorithm>
+#include <fstream>
+#include <numeric>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/options.h"
+#include "dynamic_slam/io/point_cloud_file.h"
+#include "dynamic_slam/io/trajectory_file.h"
+
+namespace dynamic_slam {
+namespace {
+
+nlohmann::ordered_json ToJson(const TimeStatistics& times) {
+  return {{"median", times.median}, {"mean", times.mean}, {"p95", times.p95}, {"max", times.max}};
+}
+
+nlohmann::ordered_json ToJson(const RunSummary& summary) {
+  nlohmann::ordered_json json;
+  json["source"] = summary.source;
+  json["layout"] = summary.layout;
+  json["camera"] = summary.camera;
+  json["frames_total"] = summary.frames_total;
+  json["frames_tracked"] = summary.frames_tracked;
+  json["frames_backfilled"] = summary.frames_backfilled;
+  json["frames_dropped"] = summary.frames_dropped;
+  json["coverage"] = summary.Coverage();
+  json["keyframes"] = summary.keyframes;
+  json["landmarks"] = summary.landmarks;
+  if (summary.initialised_at.has_value()) {
+    json["initialised_at"] = *summary.initialised_at;
+  } else {
+    json["initialised_at"] = nullptr;
+  }
+  json["lost_count"] = summary.lost_count;
+  json["reset_count"] = summary.reset_count;
+  json["last_reason"] = summary.last_reason;
+  json["tracking_ms"] = ToJson(summary.tracking_ms);
+  json["mapping_ms"] = ToJson(summary.mapping_ms);
+  json["startup_s"] = summary.startup_s;
+  json["wall_s"] = summary.wall_s;
+  json["peak_rss_mb"] = summary.peak_rss_mb;
+  json["mapping"] = {{"landmarks_created", summary.mapping.landmarks_created},
+                     {"landmarks_culled", summary.mapping.landmarks_culled},
+                     {"landmarks_merged", summary.mapping.landmarks_merged},
+                     {"keyframes_culled", summary.mapping.keyframes_culled},
+                     {"keyframes_abandoned", summary.mapping.keyframes_abandoned},
+                     {"bundles_stopped", summary.mapping.bundles_stopped},
+                     {"most_keyframes_waiting", summary.most_keyframes_waiting}};
+  json["final_bundle"] = {{"done", summary.final_bundle.usable},
+                          {"stopped", summary.final_bundle.stopped},
+                          {"iterations", summary.final_bundle.iterations},
+                          {"initial_cost", summary.final_bundle.initial_cost},
+                          {"final_cost", summary.final_bundle.final_cost}};
+  json["mode"] = Name(summary.mode);
+  json["seed"] = summary.seed;
+  json["version"] = DYNAMIC_SLAM_VERSION;
+  json["interrupted"] = summary.interrupted;
+  json["failure"] = FailureMessage(summary);
+  json["skipped"] = nlohmann::ordered_json::array();
+  for (const SourceProblem& problem : summary.skipped) {
+    json["skipped"].push_back({{"name", problem.name}, {"reason", problem.reason}});
+  }
+  return json;
+}
+
+void WriteText(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path temporary = file.string() + ".tmp";
+  std::ofstream stream(temporary, std::ios::binary);
+  stream << text;
+  stream.close();
+  std::error_code error;
+  if (stream) std::filesystem::rename(temporary, file, error);
+  if (!stream || error) {
+    throw InputError(file.string(), "cannot be written",
+                     "Choose another folder with --out, or free some space.");
+  }
+}
+
+std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
+  std::string csv = "timestamp,state,keypoints,inliers,keyframe,tracking_ms,reason\n";
+  for (const RunSummary::FrameRecord& frame : frames) {
+    csv += fmt::format("{:.9f},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state),
+                       frame.keypoints, frame.inliers, Name(frame.keyframe_reason), frame.tracking_ms,
+                       frame.reason);
+  }
+  return csv;
+}
+
+}  // namespace
+
+TimeStatistics SummariseTimes(std::vector<double> times) {
+  if (times.empty()) return {};
+  std::sort(times.begin(), times.end());
+  const size_t n = times.size();
+  const double sum = std::accumulate(times.begin(), times.end(), 0.0);
+  return {n % 2 == 1 ? times[n / 2] : 0.5 * (times[n / 2 - 1] + times[n / 2]), sum / static_cast<double>(n),
+          times[(n * 95 + 99) / 100 - 1], times.back()};
+}
+
+std::string FailureMessage(const RunSummary& summary) {
+  if (summary.failure == nullptr) return "";
+  try {
+    std::rethrow_exception(summary.failure);
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "unknown";
+  }
+}
+
+void PrepareOutputFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  const std::filesystem::path probe = folder / ".write_test";
+  if (error || !std::ofstream(probe)) {
+    throw InputError(folder.string(), error ? error.message() : "no permission to write there",
+                     "Choose another folder with --out.");
+  }
+  std::filesystem::remove(probe, error);
+}
+
+void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary) {
+  PrepareOutputFolder(folder);
+  const Trajectory trajectory = system.FrameTrajectory();
+  WriteTumTrajectory(folder / "trajectory.txt", trajectory);
+  WriteTumTrajectory(folder / "keyframes.txt", system.KeyframeTrajectory());
+  const std::filesystem::path kitti = folder / "trajectory_kitti.txt";
+  std::error_code ignored;
+  std::filesystem::remove(kitti, ignored);
+  if (summary.layout == "kitti" && !trajectory.empty() && trajectory.size() == summary.frames_total) {
+    std::vector<Rigid3> poses;
+    for (const StampedPose& pose : trajectory) poses.push_back(pose.world_from_cam);
+    WriteKittiPoses(kitti, poses);
+  }
+  WriteText(folder / "frames.csv", FramesCsv(summary.frames));
+  std::vector<Eigen::Vector3f> points;
+  system.map().Read()->landmarks().ForEach(
+      [&points](const Landmark& landmark) { points.push_back(landmark.position().cast<float>()); });
+  WritePly(folder / "map.ply", points);
+  WriteText(folder / "config.yaml", OptionsToYaml(system.options()));
+  WriteText(folder / "summary.json",
+            ToJson(summary).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <exception>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/system/slam_system.h"
+
+namespace dynamic_slam {
+
+struct TimeStatistics {
+  double median = 0, mean = 0, p95 = 0, max = 0;
+};
+
+TimeStatistics SummariseTimes(std::vector<double> times);
+
+// Everything that summary.json says of a run.
+struct RunSummary {
+  std::string source, layout, camera;
+  RunMode mode = RunMode::kOffline;
+  uint64_t seed = 0;
+  size_t frames_total = 0;       // images that the source announced, unreadable and dropped ones included
+  size_t frames_tracked = 0;     // live: with a pose when their turn came, in the map that was kept
+  size_t frames_backfilled = 0;  // given one later: those before the start of which the map was made
+  size_t frames_dropped = 0;     // realtime: came while tracking was late
+  size_t keyframes = 0, landmarks = 0;
+  std::optional<size_t> initialised_at;  // frame, counted from 0
+  int lost_count = 0;                    // times that tracking was lost
+  int reset_count = 0;         // times that a map was given up: lost while small, or started wrongly
+  TimeStatistics tracking_ms;  // of the tracked frames
+  TimeStatistics mapping_ms;   // of the keyframes; not in tracking_ms
+  MappingReport mapping;
+  int most_keyframes_waiting = 0;  // for local mapping, at any time
+  BundleSummary final_bundle;
+  double startup_s = 0;  // from the start of the process to the first frame
+  double wall_s = 0;     // from the first frame to the final map
+  double peak_rss_mb = 0;
+  bool interrupted = false;
+  std::exception_ptr failure;          // what ended the run early, if anything was thrown
+  std::string last_reason;             // what tracking said last, while it had no pose
+  std::vector<SourceProblem> skipped;  // images that could not be used
+
+  // One line of frames.csv.
+  struct FrameRecord {
+    double timestamp_s = 0;
+    TrackingState state = TrackingState::kInitialising;
+    int keypoints = 0, inliers = 0;
+    KeyframeReason keyframe_reason = KeyframeReason::kNone;
+    double tracking_ms = 0;
+    std::string reason;
+  };
+  std::vector<FrameRecord> frames;
+  double Coverage() const {  // live
+    return frames_total == 0 ? 0 : static_cast<double>(frames_tracked) / static_cast<double>(frames_total);
+  }
+};
+
+// What `failure` says; "" when there is none.
+std::string FailureMessage(const RunSummary& summary);
+
+// Writes trajectory.txt, keyframes.txt, frames.csv, map.ply, config.yaml, summary.json and, for a KITTI
+// source in which every frame has a pose, trajectory_kitti.txt into the folder, which is made. Throws
+// InputError when that is not possible.
+void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);
+
+// Makes the folder and checks that files can be written there, so that a long run does not end in an error.
+void PrepareOutputFolder(const std::filesystem::path& folder);
+
+}  // namespace dynamic_slam
