@@ -66,9 +66,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   const Camera camera = ChooseCamera(arguments, *source);
   const std::filesystem::path out = OutputFolder(arguments);
-  PrepareOutputFolder(out);
-
   SlamSystem system(camera, options);
+  PrepareOutputFolder(out);
   RunConsole console(arguments.quiet);
   RunSummary summary =
       RunSequence(*source, system, [&console](const RunProgress& p) { return console.Show(p); });

@@ -132,7 +132,14 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system,
   while (!summary.interrupted) {
     const std::optional<SourceImage> image = source.Next();
     if (!image.has_value()) break;
-    const FrameResult result = system.Process(image->timestamp_s, image->grey);
+    if (const std::string reason = system.preparer().Refusal(image->image); !reason.empty()) {
+      if (frames == 0) {
+        throw InputError(image->name, reason, "Check --camera and the options image.* against the images.");
+      }
+      summary.skipped.push_back({image->name, reason});
+      continue;
+    }
+    const FrameResult result = system.Process(image->timestamp_s, image->image);
     const bool tracking = result.tracking.state == TrackingState::kTracking;
     if (result.tracking.map_was_reset) {
       ++summary.reset_count;
@@ -156,7 +163,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system,
   system.Finish();
 
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  summary.skipped = source.Problems();
+  summary.skipped.insert(summary.skipped.end(), source.Problems().begin(), source.Problems().end());
   summary.frames_total = summary.interrupted ? frames + summary.skipped.size()
                                              : std::max(source.FrameCount(), frames + summary.skipped.size());
   summary.frames_tracked = system.LiveFrameCount();

@@ -63,7 +63,8 @@ struct RunProgress {
 };
 
 // Runs every image of the source through the system, then Finish(). `on_frame` may be empty and is called
-// after each image; returning false ends the run early, with all results so far.
+// after each image; returning false ends the run early, with all results so far. An image that cannot be
+// prepared is skipped as one that cannot be read; throws InputError when it is the first.
 RunSummary RunSequence(FrameSource& source, SlamSystem& system,
                        const std::function<bool(const RunProgress&)>& on_frame);
 

@@ -8,6 +8,7 @@
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
+#include "dynamic_slam/io/image_preparer.h"
 #include "dynamic_slam/map/map.h"
 #include "dynamic_slam/mapping/local_mapper.h"
 #include "dynamic_slam/system/system_options.h"
@@ -27,12 +28,13 @@ struct FrameResult {
 // images, options and binary give the same map bit by bit.
 class SlamSystem {
  public:
-  // Throws InputError when the camera or an option is out of range.
-  SlamSystem(const Camera& camera, const SystemOptions& options);
+  // raw_camera: of the images that Process takes. Throws InputError when it or an option is out of range.
+  SlamSystem(const Camera& raw_camera, const SystemOptions& options);
 
-  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of that size, not 0 where keypoints are
-  // forbidden.
-  FrameResult Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask = {});
+  // image: of the raw camera's size, any type that ImagePreparer takes. mask: empty, or CV_8UC1 of camera()'s
+  // size, not 0 where keypoints are forbidden, beside those of the static mask. Throws InputError, and
+  // changes nothing, when the image cannot be prepared.
+  FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
   // To be called once after the last image; adjusts the whole map. Poses and landmarks are final after it.
   void Finish();
@@ -45,7 +47,8 @@ class SlamSystem {
   size_t LiveFrameCount() const;
 
   const Map& map() const { return map_; }
-  const Camera& camera() const { return camera_; }
+  const ImagePreparer& preparer() const { return preparer_; }
+  const Camera& camera() const { return preparer_.camera(); }  // of the prepared images
   const SystemOptions& options() const { return options_; }
 
  private:
@@ -57,13 +60,14 @@ class SlamSystem {
     bool is_live;  // not given its pose by a later frame
   };
 
-  Camera camera_;
   SystemOptions options_;
+  ImagePreparer preparer_;
   Map map_;
   Tracker tracker_;
   LocalMapper mapper_;
   std::vector<TrackedFrame> tracked_;
   uint32_t frame_count_ = 0;
+  cv::Mat grey_;  // the image in work
 };
 
 }  // namespace dynamic_slam
