@@ -45,7 +45,7 @@ Camera ChooseCamera(const RunArguments& arguments, const FrameSource& source) {
     throw InputError(arguments.source, "has no camera file of its own",
                      fmt::format("Give one with --camera FILE, or --camera NAME with one of: {}.", known));
   }
-  CheckCameraFits(camera, source.ImageSize());
+  CheckCameraFits(camera, arguments.camera.empty() ? arguments.source : arguments.camera, source.ImageSize());
   return camera;
 }
 

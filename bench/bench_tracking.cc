@@ -89,7 +89,7 @@ void RunBench(const BenchArguments& arguments) {
   ApplySet(&options, arguments.assignments);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source);
   const Camera camera = ChooseCamera(arguments, *source);
-  CheckCameraFits(camera, source->ImageSize());
+  CheckCameraFits(camera, arguments.source, source->ImageSize());
 
   // Before and after the run, so that a machine that gets slower meanwhile slows both sides of the ratio.
   std::vector<double> orb_ms = TimeOpenCvOrb(arguments.source, camera);

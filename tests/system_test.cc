@@ -190,7 +190,7 @@ TEST_F(SystemTest, AnImageThatCannotBePreparedIsSkippedUnlessItIsTheFirst) {
   EXPECT_EQ(run.summary.skipped[0].name, "2");
   EXPECT_THAT(run.summary.skipped[0].reason, HasSubstr("image.bayer is rggb"));
 
-  ImageSource colour({frames[2]});
+  ImageSource colour(std::vector<cv::Mat>{frames[2]});
   EXPECT_THAT(ErrorOf([&] { RunAll(colour, DefaultRoomCamera(), options); }),
               HasSubstr("image.bayer is rggb"));
 }
