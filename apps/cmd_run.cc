@@ -45,7 +45,7 @@ Camera ChooseCamera(const RunArguments& arguments, const FrameSource& source) {
     throw InputError(arguments.source, "has no camera file of its own",
                      fmt::format("Give one with --camera FILE, or --camera NAME with one of: {}.", known));
   }
-  CheckCameraFits(camera, source.ImageSize());
+  CheckCameraFits(camera, arguments.camera.empty() ? arguments.source : arguments.camera, source.ImageSize());
   return camera;
 }
 
@@ -66,13 +66,14 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   const Camera camera = ChooseCamera(arguments, *source);
   const std::filesystem::path out = OutputFolder(arguments);
-  PrepareOutputFolder(out);
-
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
+  PrepareOutputFolder(out);
   RunConsole console(arguments.quiet);
   RunSummary summary = RunSequence(*source, system, console.Control());
   summary.source = arguments.source;
   console.End();
+  const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
+  if (is_hopeless) std::rethrow_exception(summary.failure);
   WriteResults(out, system, summary);
   PrintSummary(summary);
   ReportTruth(arguments.source, system.FrameTrajectory(), out);

@@ -110,30 +110,92 @@ class CliRunTest(unittest.TestCase):
         self.assertIsNone(json.loads(read(out, "summary.json"))["initialised_at"])
 
     def test_input_errors_come_before_the_first_frame(self):
+        """Each names the thing, the reason and the remedy."""
         camera = self.write("camera.yaml", CAMERA)
-        self.assert_input_error([os.path.join(self.folder, "missing")], "missing", "no such file or folder")
+        path = lambda name: os.path.join(self.folder, name)
+
+        self.assert_input_error([path("missing")], path("missing"), "no such file or folder", "Check the path")
         self.write("empty/rgb.txt", "# timestamp filename\n")
-        self.assert_input_error([os.path.join(self.folder, "empty"), "--camera", camera], "rgb.txt")
+        self.assert_input_error([path("empty"), "--camera", camera], path("empty/rgb.txt"), "lists no image",
+                                "timestamp rgb/file.png")
+        os.mkdir(path("nothing"))
+        self.assert_input_error([path("nothing"), "--camera", camera], path("nothing"), "no image", "Known are: TUM")
+        text = self.write("notes.txt", "not a video")
+        self.assert_input_error([text, "--camera", camera], text, "is not a video", "Give the folder")
+        photo = os.path.join(self.room, "rgb", sorted(os.listdir(os.path.join(self.room, "rgb")))[0])
+        self.assert_input_error([photo, "--camera", camera], photo, "is a single image", "Give the folder")
+        self.write("broken/rgb.txt", "1 rgb/1.png\n2 rgb/2.png\n")
+        self.write("broken/rgb/1.png", "no image")
+        self.assert_input_error([path("broken"), "--camera", camera], path("broken"),
+                                "no image of it can be read (first: rgb/1.png: the image cannot be decoded)",
+                                "Check the files")
+        shutil.copytree(os.path.join(self.room, "rgb"), path("images"))
+        self.assert_input_error([path("images")], path("images"), "has no camera file", "--camera", "tum_fr1")
+
         misspelt = self.write("misspelt.yaml", CAMERA.replace("width", "widht"))
-        self.assert_input_error([self.room, "--camera", misspelt], "misspelt.yaml:2", "widht", "width")
+        self.assert_input_error([self.room, "--camera", misspelt], "misspelt.yaml:2", "unknown key 'widht'",
+                                "Did you mean 'width'?", "'width' is missing", "Correct the file")
         small = self.write("small.yaml", CAMERA.replace("640", "320").replace("cx: 320.1", "cx: 160"))
-        self.assert_input_error([self.room, "--camera", small], "320", "640")
+        self.assert_input_error([self.room, "--camera", small], small, "320 x 480 px, these have 640 x 480 px",
+                                "Choose another --camera")
         flat = self.write("flat.yaml", CAMERA.replace("fx: 535.4", "fx: 0"))
-        self.assert_input_error([self.room, "--camera", flat], "flat.yaml", "fx")
-        self.assert_input_error([self.room, "--camera", "tum_fr9"], "tum_fr9", "tum_fr1")
+        self.assert_input_error([self.room, "--camera", flat], "flat.yaml:5", "fx is 0", "Correct the file")
+        self.assert_input_error([self.room, "--camera", "tum_fr9"], "tum_fr9", "Known names", "tum_fr1")
+
         self.assert_input_error([self.room, "--set", "orb.feature=100"], "orb.feature", "orb.features")
         self.assert_input_error([self.room, "--set", "orb.features=1"], "orb.features", "50")
-        self.assert_input_error([self.room, "--config", self.write("c.yaml", "orb:\n  featurs: 5\n")], "c.yaml:2", "featurs")
-        shutil.copytree(os.path.join(self.room, "rgb"), os.path.join(self.folder, "images"))
-        self.assert_input_error([os.path.join(self.folder, "images")], "images", "--camera", "tum_fr1")
+        config = self.write("c.yaml", "orb:\n  featurs: 5\n")
+        self.assert_input_error([self.room, "--config", config], "c.yaml:2", "featurs")
+        self.assert_input_error([self.room, "--set", f"image.mask={path('no.png')}"], path("no.png"),
+                                "the file is missing", "image.mask")
+        self.assert_input_error([self.room, "--set", "image.crop_left=600"], "crop_left", "principal point",
+                                "Choose a part")
+        self.assert_input_error([self.room, "--set", "image.bayer=rgb"], "image.bayer", "'rgb'", "rggb")
         self.assert_input_error([self.room, "--detector", "magic"], "--detector")
         self.assert_input_error([self.room, "--mode", "realtime"], "--mode")
 
     def test_a_folder_that_cannot_be_written_is_an_input_error(self):
-        blocked = self.write("file", "")
-        result = run_program("run", self.room, "--out", os.path.join(blocked, "out"))
-        self.assertEqual(result.returncode, 2, result)
-        self.assertIn("--out", result.stderr)
+        # Below a file and in /proc not even root can.
+        for out in (os.path.join(self.write("file", ""), "out"), "/proc/out"):
+            result = run_program("run", self.room, "--out", out)
+            self.assertEqual(result.returncode, 2, result)
+            self.assertRegex(result.stderr, f"^error: {out}: .+\n +Choose another folder with --out")
+            self.assertEqual(result.stdout, "")
+        self.assertEqual(os.listdir(self.folder), ["file"])
+
+    def test_faults_in_mid_sequence_cost_one_frame_each(self):
+        sequence, out = os.path.join(self.folder, "faults"), os.path.join(self.folder, "a")
+        shutil.copytree(self.room, sequence)
+        lines = data_lines(sequence, "rgb.txt")
+        names = [line.split()[1] for line in lines]
+        with open(os.path.join(sequence, names[20]), "r+b") as file:
+            file.truncate(os.path.getsize(file.name) // 2)
+        os.remove(os.path.join(sequence, names[30]))
+        # A grey image of 16 x 16 px.
+        with open(os.path.join(sequence, "small.pgm"), "wb") as file:
+            file.write(b"P5 16 16 255 " + bytes(256))
+        lines[40] = f"{lines[40].split()[0]} small.pgm"
+        lines[50] = f"nan {names[50]}"
+        lines[60] = f"{lines[10].split()[0]} {names[60]}"  # goes back
+        lines[65] = f"1e12 {names[65]}"
+        lines[70] = "what is this"
+        lines.insert(75, lines[74])  # twice
+        self.write("faults/rgb.txt", "\n".join(lines) + "\n")
+
+        result = run_program("run", sequence, "--quiet", "--out", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr, "", "decoders do not chatter")
+        summary = json.loads(read(out, "summary.json"))
+        self.assertEqual(summary["frames_total"], FRAMES + 1)
+        reasons = {item["name"]: item["reason"] for item in summary["skipped"]}
+        self.assertEqual(len(summary["skipped"]), 8)
+        for name, reason in ((names[20], "truncated"), (names[30], "missing"), ("small.pgm", "16 x 16 px"),
+                             ("rgb.txt:51", "nan"), (names[60], "goes back"), (names[65], "is ahead of"),
+                             ("rgb.txt:71", "what is this"), (names[74], "duplicate")):
+            self.assertIn(reason, reasons.get(name, "not skipped"), name)
+        self.assertEqual(len(read(out, "frames.csv").splitlines()), 1 + FRAMES + 1 - 8)
+        self.assertEqual(summary["lost_count"], 0)
+        self.assertGreater(summary["frames_tracked"], 80)
 
     def test_interrupt_keeps_the_results(self):
         out = os.path.join(self.folder, "a")

@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/base/text.h"
@@ -170,10 +172,62 @@ TEST_F(SystemTest, AnInterruptedRunKeepsWhatItHas) {
   EXPECT_GT(summary.Coverage(), 0.5);
 }
 
-TEST_F(SystemTest, AnImageOfTheWrongSizeIsABug) {
+TEST_F(SystemTest, AnImageThatCannotBePreparedChangesNothing) {
   SlamSystem system(DefaultRoomCamera(), {});
-  EXPECT_THROW(system.Process(0, cv::Mat::zeros(480, 641, CV_8UC1)), InternalError);
-  EXPECT_THROW(system.Process(0, cv::Mat::zeros(480, 640, CV_8UC3)), InternalError);
+  EXPECT_THAT(ErrorOf([&] { system.Process(0, cv::Mat::zeros(480, 641, CV_8UC1)); }), HasSubstr("641 x 480"));
+  EXPECT_EQ(system.Process(0, cv::Mat::zeros(480, 640, CV_16UC3)).id, FrameId(0));
+}
+
+TEST_F(SystemTest, AnImageThatCannotBePreparedIsSkippedUnlessItIsTheFirst) {
+  const Room room = MakeRoom(4);
+  std::vector<cv::Mat> frames = Frames(room, 0, 4);
+  cv::cvtColor(frames[2], frames[2], cv::COLOR_GRAY2BGR);
+  SystemOptions options;
+  options.image.bayer = "rggb";
+  ImageSource source(frames);
+  const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+  EXPECT_EQ(run.summary.frames.size(), 3u);
+  EXPECT_EQ(run.summary.frames_total, 4u);
+  ASSERT_EQ(run.summary.skipped.size(), 1u);
+  EXPECT_EQ(run.summary.skipped[0].name, "2");
+  EXPECT_THAT(run.summary.skipped[0].reason, HasSubstr("image.bayer is rggb"));
+
+  ImageSource colour(std::vector<cv::Mat>{frames[2]});
+  EXPECT_THAT(ErrorOf([&] { RunAll(colour, DefaultRoomCamera(), options); }),
+              HasSubstr("image.bayer is rggb"));
+}
+
+TEST_F(SystemTest, PreparedImagesGiveTheSamePath) {
+  // Three quarters of the size, without a strip at the bottom, from 12 bits in 16.
+  const Room room = MakeRoom(60);
+  std::vector<cv::Mat> frames = Frames(room, 0, 60);
+  for (cv::Mat& frame : frames) frame.convertTo(frame, CV_16U, 4095.0 / 255);
+  SystemOptions options;
+  options.image.crop_height = 440;
+  options.image.resize_width = 480;
+  options.image.white_level = 4095;
+  ImageSource source(frames);
+  const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+  EXPECT_EQ(run.system->camera().width, 480);
+  EXPECT_EQ(run.system->camera().height, 330);
+  ASSERT_TRUE(run.summary.initialised_at.has_value()) << run.summary.last_reason;
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
+            0.005 * PathLength(ToPoseList(room.truth())));
+}
+
+TEST_F(SystemTest, NothingIsSeenUnderTheMaskFile) {
+  const Room room = MakeRoom(3);
+  cv::Mat used(480, 640, CV_8UC1, cv::Scalar(255));
+  used(cv::Rect(0, 240, 640, 240)) = 0;
+  SystemOptions options;
+  options.image.mask = (folder_ / "mask.png").string();
+  ASSERT_TRUE(cv::imwrite(options.image.mask, used));
+  SlamSystem system(room.options().camera, options), free(room.options().camera, {});
+  cv::Mat right = cv::Mat::zeros(480, 640, CV_8UC1);
+  right(cv::Rect(320, 0, 320, 480)) = 255;
+  EXPECT_EQ(system.Process(0, room.Frame(0), right).tracking.keypoints,
+            free.Process(0, room.Frame(0), right | (used == 0)).tracking.keypoints)
+      << "both masks count";
 }
 
 TEST_F(SystemTest, OptionsAndCamerasOutOfRangeAreNamed) {

@@ -128,10 +128,10 @@ void WriteCamera(const fs::path& file, const Camera& camera) {
   WriteFileAtomically(file, EntriesToYaml(CollectOptions(fields)));
 }
 
-void CheckCameraFits(const Camera& camera, const cv::Size& image_size) {
+void CheckCameraFits(const Camera& camera, const std::string& origin, const cv::Size& image_size) {
   if (camera.width == image_size.width && camera.height == image_size.height) return;
   throw InputError(
-      fmt::format("camera '{}'", camera.name),
+      fmt::format("{}: camera '{}'", origin, camera.name),
       fmt::format("is for images of {} x {} px, these have {} x {} px", camera.width, camera.height,
                   image_size.width, image_size.height),
       "Choose another --camera, or scale fx, fy, cx and cy to this size in a camera file of your own.");

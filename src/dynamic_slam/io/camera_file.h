@@ -24,8 +24,9 @@ std::vector<std::string> KnownCameras();
 
 void WriteCamera(const std::filesystem::path& file, const Camera& camera);
 
-// Throws InputError when images of this size cannot be from that camera.
-void CheckCameraFits(const Camera& camera, const cv::Size& image_size);
+// Throws InputError when images of this size cannot be from that camera. origin: where the camera is from,
+// for the message.
+void CheckCameraFits(const Camera& camera, const std::string& origin, const cv::Size& image_size);
 
 // P0 of a KITTI calib.txt; that file holds neither size nor frame rate.
 Camera ReadKittiCalibration(const std::filesystem::path& file, const cv::Size& image_size, double fps);

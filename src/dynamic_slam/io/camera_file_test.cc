@@ -100,9 +100,9 @@ TEST_F(CameraFile, UnknownNamesListTheKnownOnes) {
 
 TEST_F(CameraFile, ChecksTheImageSize) {
   const Camera camera = LoadCamera("tum_fr1");
-  EXPECT_NO_THROW(CheckCameraFits(camera, {640, 480}));
+  EXPECT_NO_THROW(CheckCameraFits(camera, "", {640, 480}));
   EXPECT_THAT(ErrorOf([&] {
-                CheckCameraFits(camera, {1241, 376});
+                CheckCameraFits(camera, "my.yaml", {1241, 376});
               }),
               HasSubstr("is for images of 640 x 480 px, these have 1241 x 376 px"));
 }

@@ -5,13 +5,12 @@
 #include <utility>
 
 #include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/camera_file.h"
+#include "dynamic_slam/io/image_file.h"
 #include "dynamic_slam/io/source_layout.h"
 
 namespace dynamic_slam {
@@ -20,37 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kDefaultFps = 30;
-
-// Libjpeg fills up a truncated image with grey and calls it a success: the last start of scan (FF DA) must
-// have an end of image (FF D9) after it. Neither pair occurs in entropy-coded data.
-bool IsTruncatedJpeg(const std::string& bytes) {
-  if (!bytes.starts_with("\xFF\xD8\xFF")) return false;
-  const size_t scan = bytes.rfind("\xFF\xDA"), end = bytes.rfind("\xFF\xD9");
-  return scan == std::string::npos || end == std::string::npos || end < scan;
-}
-
-// The image as CV_8UC1, or an empty one and the reason.
-cv::Mat DecodeGrey(const fs::path& file, std::string* reason) {
-  std::error_code ignored;
-  if (!fs::is_regular_file(file, ignored)) return *reason = "the file is missing", cv::Mat();
-  std::string bytes;
-  try {
-    bytes = ReadFile(file);
-  } catch (const InputError&) {
-    return *reason = "the file cannot be read", cv::Mat();
-  }
-  if (bytes.empty()) return *reason = "the file is empty", cv::Mat();
-  if (IsTruncatedJpeg(bytes)) return *reason = "the image is truncated", cv::Mat();
-  cv::Mat grey;
-  try {
-    grey =
-        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data()), cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {
-    grey.release();
-  }
-  if (grey.empty()) *reason = "the image cannot be decoded";
-  return grey;
-}
 
 // What all sources do alike: keep the first image, check size and stamp of each.
 class CheckedSource : public FrameSource {
@@ -91,16 +59,17 @@ class CheckedSource : public FrameSource {
 
  private:
   std::string Refusal(const SourceImage& image) {
+    if (!std::isfinite(image.timestamp_s)) return fmt::format("its stamp is {}", image.timestamp_s);
     if (last_stamp_s_ && image.timestamp_s < *last_stamp_s_) {
       return fmt::format("its stamp {:.6f} goes back behind {:.6f}", image.timestamp_s, *last_stamp_s_);
     }
     if (last_stamp_s_ && image.timestamp_s == *last_stamp_s_) {
       return fmt::format("its stamp {:.6f} is a duplicate", image.timestamp_s);
     }
-    if (size_.empty()) size_ = image.grey.size();
-    if (image.grey.size() != size_) {
-      return fmt::format("its size is {} x {} px, that of the first image {} x {} px", image.grey.cols,
-                         image.grey.rows, size_.width, size_.height);
+    if (size_.empty()) size_ = image.image.size();
+    if (image.image.size() != size_) {
+      return fmt::format("its size is {} x {} px, that of the first image {} x {} px", image.image.cols,
+                         image.image.rows, size_.width, size_.height);
     }
     return "";
   }
@@ -146,7 +115,7 @@ class ListedSource : public CheckedSource {
     const SourceEntry& entry = all_[next_++];
     *reason = entry.problem;
     *image = {entry.timestamp_s, {}, entry.name};
-    if (reason->empty()) image->grey = DecodeGrey(entry.file, reason);
+    if (reason->empty()) image->image = ReadImage(entry.file, reason);
     return true;
   }
 
@@ -173,8 +142,9 @@ class VideoSource : public CheckedSource {
  public:
   VideoSource(const fs::path& path, const FrameSourceOptions& options) : CheckedSource("video") {
     if (!OpenQuietly(path.string())) {
-      throw InputError(path.string(), "is not a video that can be read",
-                       "Convert it, for instance with ffmpeg to MP4, or into a folder of images.");
+      throw InputError(
+          path.string(), "is not a video that can be read",
+          "Give the folder of a sequence; or convert the video, for instance with ffmpeg to MP4.");
     }
     fps_ = options.fps > 0 ? options.fps : capture_.get(cv::CAP_PROP_FPS);
     if (!(fps_ > 0 && fps_ < 1e5)) fps_ = kDefaultFps;
@@ -208,12 +178,7 @@ class VideoSource : public CheckedSource {
       return true;
     }
     ++index_;
-    if (frame.channels() == 1) {
-      image->grey = frame.clone();  // the decoder may use its buffer again
-    } else {
-      image->grey.release();
-      cv::cvtColor(frame, image->grey, frame.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
-    }
+    image->image = frame.clone();  // the decoder may use its buffer again
     return true;
   }
 
@@ -244,6 +209,9 @@ std::unique_ptr<FrameSource> OpenFrameSource(const fs::path& path, const FrameSo
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw InputError(path.string(), "there is no such file or folder", "Check the path.");
+  }
+  if (fs::is_regular_file(path, ignored) && HasImageExtension(path)) {
+    throw InputError(path.string(), "is a single image", "Give the folder of the images, or a video file.");
   }
   if (!fs::is_directory(path, ignored)) return std::make_unique<VideoSource>(path, options);
   const double fps = options.fps > 0 ? options.fps : kDefaultFps;

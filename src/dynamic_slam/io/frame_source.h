@@ -14,7 +14,7 @@ namespace dynamic_slam {
 
 struct SourceImage {
   double timestamp_s = 0;
-  cv::Mat grey;      // CV_8UC1
+  cv::Mat image;     // as decoded: grey, BGR or BGRA; ImagePreparer makes it grey
   std::string name;  // file or frame number, for messages
 };
 

@@ -1,27 +1,19 @@
 #include "dynamic_slam/io/source_layout.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
+#include "dynamic_slam/io/image_file.h"
 
 namespace dynamic_slam {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool IsImage(const fs::path& file) {
-  static constexpr std::array<std::string_view, 10> kExtensions = {".png",  ".jpg", ".jpeg", ".bmp",  ".tif",
-                                                                   ".tiff", ".pgm", ".ppm",  ".webp", ".jp2"};
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
-}
 
 // The images of a folder in natural order; empty when there is no such folder.
 std::vector<fs::path> ListImages(const fs::path& folder) {
@@ -29,7 +21,8 @@ std::vector<fs::path> ListImages(const fs::path& folder) {
   std::error_code ignored;
   for (const auto& item : fs::directory_iterator(folder, ignored)) {
     const std::string name = item.path().filename().string();
-    if (IsImage(item.path()) && !name.starts_with('.') && !item.is_directory()) images.push_back(item.path());
+    if (HasImageExtension(item.path()) && !name.starts_with('.') && !item.is_directory())
+      images.push_back(item.path());
   }
   std::sort(images.begin(), images.end(), [](const fs::path& a, const fs::path& b) {
     return NaturalLess(a.filename().string(), b.filename().string());
@@ -141,9 +134,30 @@ SourceListing ListImageFolder(const fs::path& folder, const std::vector<fs::path
   return listing;
 }
 
-}  // namespace
+// One stamp far ahead must not make all later ones go back: it is the stamp that is wrong when most of the
+// next few lie before it and behind the last good one.
+void MarkStampsAhead(std::vector<SourceEntry>* entries) {
+  constexpr size_t kNext = 5, kMost = 3;
+  std::vector<SourceEntry*> good;
+  for (SourceEntry& entry : *entries) {
+    if (entry.problem.empty()) good.push_back(&entry);
+  }
+  double last_s = -std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < good.size(); ++i) {
+    const double stamp_s = good[i]->timestamp_s;
+    size_t between = 0;
+    for (size_t j = i + 1; j < std::min(good.size(), i + 1 + kNext); ++j) {
+      if (good[j]->timestamp_s > last_s && good[j]->timestamp_s < stamp_s) ++between;
+    }
+    if (between >= kMost) {
+      good[i]->problem = fmt::format("its stamp {:.6f} is ahead of those that follow", stamp_s);
+    } else {
+      last_s = std::max(last_s, stamp_s);
+    }
+  }
+}
 
-SourceListing ListSource(const fs::path& folder, double fps) {
+SourceListing ListAnySource(const fs::path& folder, double fps) {
   if (fs::is_regular_file(folder / "rgb.txt")) return ListTum(folder);
   for (const char* cam0 : {"mav0/cam0", "cam0", "."}) {
     const fs::path path = (folder / cam0).lexically_normal();
@@ -164,6 +178,14 @@ SourceListing ListSource(const fs::path& folder, double fps) {
     remedy = "rgb.txt is missing: copy it here, or give the folder rgb itself with --fps.";
   }
   throw InputError(folder.string(), "the folder holds no image and no known layout", remedy);
+}
+
+}  // namespace
+
+SourceListing ListSource(const fs::path& folder, double fps) {
+  SourceListing listing = ListAnySource(folder, fps);
+  MarkStampsAhead(&listing.entries);
+  return listing;
 }
 
 bool NaturalLess(std::string_view a, std::string_view b) {

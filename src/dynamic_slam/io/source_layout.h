@@ -23,7 +23,8 @@ struct SourceListing {
   std::vector<SourceEntry> entries;
 };
 
-// Recognises the folder's layout and lists its images in order. Throws InputError as OpenFrameSource does.
+// Recognises the folder's layout and lists its images in order, with the problems that can be told by then:
+// lines that cannot be read, stamps far ahead of all that follow. Throws InputError as OpenFrameSource does.
 // fps: of a folder of images.
 SourceListing ListSource(const std::filesystem::path& folder, double fps);
 

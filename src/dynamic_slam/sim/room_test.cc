@@ -181,7 +181,7 @@ TEST(RoomSource, DeliversTheFramesInOrder) {
     const std::optional<SourceImage> image = source->Next();
     ASSERT_TRUE(image);
     EXPECT_EQ(image->timestamp_s, i / 30.0);
-    EXPECT_EQ(MeanDifference(image->grey, room.Frame(i)), 0);
+    EXPECT_EQ(MeanDifference(image->image, room.Frame(i)), 0);
   }
   EXPECT_FALSE(source->Next());
 }

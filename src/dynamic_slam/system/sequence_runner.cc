@@ -9,6 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "dynamic_slam/base/error.h"
 #include "dynamic_slam/system/frame_feed.h"
 
 namespace dynamic_slam {
@@ -92,7 +93,14 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
       if (summary.interrupted) break;
       const std::optional<SourceImage> image = feed->Next();
       if (!image.has_value()) break;
-      const FrameResult result = system.Process(image->timestamp_s, image->grey);
+      if (const std::string reason = system.preparer().Refusal(image->image); !reason.empty()) {
+        if (summary.frames.empty()) {
+          throw InputError(image->name, reason, "Check --camera and the options image.* against the images.");
+        }
+        summary.skipped.push_back({image->name, reason});
+        continue;
+      }
+      const FrameResult result = system.Process(image->timestamp_s, image->image);
       log.Add(image->timestamp_s, result);
       if (control.on_frame) control.on_frame({summary.frames.size(), announced, &result, &system.map()});
     }
@@ -106,7 +114,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
   }
 
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  summary.skipped = source.Problems();
+  summary.skipped.insert(summary.skipped.end(), source.Problems().begin(), source.Problems().end());
   const size_t seen = summary.frames.size() + summary.frames_dropped + summary.skipped.size();
   const bool is_whole = !summary.interrupted && summary.failure == nullptr;
   summary.frames_total = is_whole ? std::max(announced, seen) : seen;

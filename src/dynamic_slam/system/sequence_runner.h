@@ -24,7 +24,8 @@ struct RunControl {
 
 // Runs every image of the source through the system, then Finish(); in realtime mode at the pace of the time
 // stamps. A run that is stopped, or in which something throws (RunSummary::failure), ends soon and with all
-// results so far.
+// results so far. An image that cannot be prepared is skipped as one that cannot be read; the first one is a
+// failure.
 RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl& control = {});
 
 }  // namespace dynamic_slam

@@ -14,40 +14,38 @@ double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-const Camera& Validated(const Camera& camera, const SystemOptions& options) {
-  camera.Validate();
+const SystemOptions& Checked(const SystemOptions& options) {
   CheckOptions(options);
-  return camera;
+  return options;
 }
 
 }  // namespace
 
 const char* Name(RunMode mode) { return mode == RunMode::kOffline ? "offline" : "realtime"; }
 
-SlamSystem::SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode)
-    : SlamSystem(camera, options, mode,
+SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, RunMode mode)
+    : SlamSystem(raw_camera, options, mode,
                  mode == RunMode::kOffline ? MakeInlineExecutor() : MakeThreadedExecutor()) {}
 
-SlamSystem::SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode,
+SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, RunMode mode,
                        std::unique_ptr<Executor> executor)
-    : camera_(Validated(camera, options)),
-      options_(options),
+    : options_(Checked(options)),
+      preparer_(raw_camera, options.image),
       mode_(mode),
       map_(OctaveScales(options.orb)),
-      tracker_(camera, options.orb, options.tracker, options.seed, &map_),
-      mapper_(camera, options.mapper, &map_),
+      tracker_(camera(), options.orb, options.tracker, options.seed, &map_),
+      mapper_(camera(), options.mapper, &map_),
       executor_(std::move(executor)) {}
 
-FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
+FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask) {
   DS_CHECK(!is_stopped_, "the system was stopped: Reset() first");
-  DS_CHECK(grey.type() == CV_8UC1 && grey.cols == camera_.width && grey.rows == camera_.height,
-           "image {} x {} type {}, camera {} x {}", grey.cols, grey.rows, grey.type(), camera_.width,
-           camera_.height);
   executor_->ThrowIfFailed();
   FrameResult result;
-  result.id = FrameId(frame_count_++);
   const auto start = std::chrono::steady_clock::now();
-  result.tracking = tracker_.Track(result.id, timestamp_s, grey, mask, executor_->Waiting(Lane::kMapping));
+  preparer_.Prepare(image, &grey_);
+  result.id = FrameId(frame_count_++);
+  result.tracking = tracker_.Track(result.id, timestamp_s, grey_, preparer_.MergedMask(mask),
+                                   executor_->Waiting(Lane::kMapping));
   result.tracking_ms = MillisecondsSince(start);
 
   if (result.tracking.map_was_reset) tracked_.clear();

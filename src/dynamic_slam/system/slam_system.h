@@ -9,6 +9,7 @@
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
+#include "dynamic_slam/io/image_preparer.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/local_mapper.h"
 #include "dynamic_slam/system/executor.h"
@@ -47,15 +48,16 @@ struct MappingReport {
 // the results so far can be read; Reset() makes the system as new.
 class SlamSystem {
  public:
-  // Throws InputError when the camera or an option is out of range.
-  SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode = RunMode::kOffline);
+  // raw_camera: of the images that Process takes. Throws InputError when it or an option is out of range.
+  SlamSystem(const Camera& raw_camera, const SystemOptions& options, RunMode mode = RunMode::kOffline);
   // The stages beside tracking run where the executor puts them.
-  SlamSystem(const Camera& camera, const SystemOptions& options, RunMode mode,
+  SlamSystem(const Camera& raw_camera, const SystemOptions& options, RunMode mode,
              std::unique_ptr<Executor> executor);
 
-  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of that size, not 0 where keypoints are
-  // forbidden.
-  FrameResult Process(double timestamp_s, const cv::Mat& grey, const cv::Mat& mask = {});
+  // image: of the raw camera's size, any type that ImagePreparer takes. mask: empty, or CV_8UC1 of camera()'s
+  // size, not 0 where keypoints are forbidden, beside those of the static mask. Throws InputError, and
+  // changes nothing, when the image cannot be prepared.
+  FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
   // To be called after the last image: waits for the stages, then adjusts the whole map. Poses and landmarks
   // are final after it. `should_stop` may be empty; when it says so, the adjustment ends with what it has.
@@ -79,7 +81,8 @@ class SlamSystem {
   MappingReport mapping_report() const { return *mapping_report_.Read(); }
   RunMode mode() const { return mode_; }
   const SharedMap& map() const { return map_; }
-  const Camera& camera() const { return camera_; }
+  const ImagePreparer& preparer() const { return preparer_; }
+  const Camera& camera() const { return preparer_.camera(); }  // of the prepared images
   const SystemOptions& options() const { return options_; }
 
  private:
@@ -93,8 +96,8 @@ class SlamSystem {
 
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
 
-  Camera camera_;
   SystemOptions options_;
+  ImagePreparer preparer_;
   RunMode mode_;
   SharedMap map_;
   Tracker tracker_;
@@ -102,6 +105,7 @@ class SlamSystem {
   Guarded<MappingReport> mapping_report_;
   std::vector<TrackedFrame> tracked_;
   uint32_t frame_count_ = 0;
+  cv::Mat grey_;  // the image in work
   bool is_stopped_ = false;
   std::unique_ptr<Executor> executor_;  // last: its tasks use all the others
 };

@@ -4,6 +4,7 @@
 
 #include "dynamic_slam/base/option_field.h"
 #include "dynamic_slam/features/orb_options.h"
+#include "dynamic_slam/io/image_options.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 
@@ -12,6 +13,7 @@ namespace dynamic_slam {
 struct SystemOptions {
   uint64_t seed = 1;
   bool final_bundle = true;
+  ImageOptions image;
   OrbOptions orb;
   TrackerOptions tracker;
   MapperOptions mapper;
@@ -22,6 +24,7 @@ struct SystemOptions {
           OptionField{"", 0, 0, "Seed of everything random: the same seed gives the same bytes."});
     visit("final_bundle", self.final_bundle,
           OptionField{"", 0, 1, "Adjust the whole map once more when the sequence is over."});
+    visit("image", self.image);
     visit("orb", self.orb);
     visit("tracker", self.tracker);
     visit("mapper", self.mapper);
