@@ -16,20 +16,21 @@ struct LandmarkProjection {
   int octave = 0;
 };
 
-// Tells of landmarks whether a view at a given pose can see them: before the camera, inside the image, from a distance
-// and a direction that resemble those from which they have been seen.
+// Tells of landmarks whether a view at a given pose can see them: before the camera, inside the image, from a
+// distance and a direction that resemble those from which they have been seen.
 class LandmarkProjector {
  public:
   LandmarkProjector(const Camera& camera, const std::vector<float>& octave_scales);
 
   void SetPose(const Rigid3& cam_from_world);
 
-  bool Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal, float min_distance, float max_distance,
-               LandmarkProjection* projection) const;
+  bool Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal, float min_distance,
+               float max_distance, LandmarkProjection* projection) const;
 
-  // Inside the image, in ideal px.
+  // Inside the image and within the largest angle at which a fisheye's rays are used; px: ideal.
   bool IsInImage(const Eigen::Vector2d& px) const {
-    return px.x() >= bounds_[0] && px.y() >= bounds_[1] && px.x() <= bounds_[2] && px.y() <= bounds_[3];
+    return px.x() >= bounds_[0] && px.y() >= bounds_[1] && px.x() <= bounds_[2] && px.y() <= bounds_[3] &&
+           camera_.CanSeeIdeal(px);
   }
 
  private:

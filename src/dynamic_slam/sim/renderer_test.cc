@@ -19,6 +19,17 @@ Camera WithDistortion() {  // TUM's fr1
   return camera;
 }
 
+Camera Fisheye() {
+  Camera camera = DefaultRoomCamera();
+  camera.model = LensModel::kKannalaBrandt;
+  camera.fx = camera.fy = 300;
+  camera.k1 = -0.011;
+  camera.k2 = 0.006;
+  camera.k3 = -0.004;
+  camera.k4 = 0.0009;
+  return camera;
+}
+
 constexpr int kSquare = 64, kSquares = 12;  // texels, and how many in a row
 
 TexturedQuad Checkerboard() {
@@ -68,7 +79,7 @@ TEST_P(CornersAreWhereTheyProject, WithinATenthOfAPixel) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, CornersAreWhereTheyProject,
-                         ::testing::Values(DefaultRoomCamera(), WithDistortion()));
+                         ::testing::Values(DefaultRoomCamera(), WithDistortion(), Fisheye()));
 
 TEST(Renderer, TheNearerQuadHidesTheFartherWhateverTheirOrder) {
   const TexturedQuad far = Plain(50, {-2, -2, 3}, {4, 0, 0}, {0, 4, 0});
