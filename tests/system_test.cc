@@ -1,6 +1,7 @@
 // The whole SLAM in a rendered room with exact truth.
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,32 @@ TEST_P(RoomTest, TheCameraIsFollowedThroughIt) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RoomTest, ::testing::Range<uint64_t>(1, 6));
+
+TEST_F(SystemTest, AFisheyeIsFollowedThroughTheRoom) {
+  RoomOptions options;
+  options.frames = 150;
+  options.camera.model = LensModel::kKannalaBrandt;
+  options.camera.fx = options.camera.fy = 300;  // 60 deg at 311 px from the centre, 78 deg at the corners
+  options.camera.k1 = -0.011;
+  options.camera.k2 = 0.006;
+  options.camera.k3 = -0.004;
+  options.camera.k4 = 0.0009;
+  const Room room(options);
+  const WholeRun run = RunAll(*MakeRoomSource(room), options.camera);
+  ASSERT_TRUE(run.summary.initialised_at.has_value()) << run.summary.last_reason;
+  EXPECT_GE(run.summary.Coverage(), 0.95);
+  EXPECT_EQ(run.summary.lost_count, 0);
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
+            0.005 * PathLength(ToPoseList(room.truth())));
+  double farthest_px = 0;
+  run.system->map().keyframes().ForEach([&](const Keyframe& keyframe) {
+    for (const Keypoint& keypoint : keyframe.features().keypoints) {
+      farthest_px = std::max<double>(farthest_px, std::hypot(keypoint.raw_x - 320.1, keypoint.raw_y - 247.6));
+    }
+  });
+  EXPECT_GT(farthest_px, 295);
+  EXPECT_LT(farthest_px, 311.4 + 3);  // to a pixel of its octave
+}
 
 TEST_F(SystemTest, TwoRunsGiveTheSameBytes) {
   const std::vector<cv::Mat> frames = Frames(MakeRoom(90), 0, 90);

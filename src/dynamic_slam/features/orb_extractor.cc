@@ -45,6 +45,7 @@ class OrbExtractor::Impl {
       scale *= options.scale_factor;
     }
     available_.resize(levels_.size());
+    MaskBlindPixels(camera);
   }
 
   void Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet* features) {
@@ -62,6 +63,7 @@ class OrbExtractor::Impl {
       Smooth(level.image, &level.smoothed, &row_);
       fast_.Detect(level.smoothed, SteeredBrief::kBorder, options_.fast_threshold_min, &level.corners);
       if (!mask.empty()) DropMasked(mask, &level);
+      if (!blind_.empty()) DropMasked(blind_, &level);
       available_[i] = static_cast<int>(level.corners.size());
     }
     const std::vector<int> wanted = ShareOverLevels(options_.features, weights_, available_);
@@ -92,6 +94,17 @@ class OrbExtractor::Impl {
     float FullY(float y) const { return (y + 0.5f) * scale_y - 0.5f; }
   };
 
+  // Makes blind_ when the camera has pixels whose rays cannot be used.
+  void MaskBlindPixels(const Camera& camera) {
+    if (camera.model == LensModel::kRadialTangential) return;  // sees everywhere
+    cv::Mat blind(camera.height, camera.width, CV_8UC1);
+    for (int y = 0; y < blind.rows; ++y) {
+      for (int x = 0; x < blind.cols; ++x)
+        blind.at<uint8_t>(y, x) = camera.CanSee(Eigen::Vector2d(x, y)) ? 0 : 1;
+    }
+    if (cv::countNonZero(blind) > 0) blind_ = blind;
+  }
+
   static void DropMasked(const cv::Mat& mask, Level* level) {
     std::erase_if(level->corners, [&](const Corner& corner) {
       return mask.at<uint8_t>(cvRound(level->FullY(corner.y)), cvRound(level->FullX(corner.x))) != 0;
@@ -120,6 +133,7 @@ class OrbExtractor::Impl {
   CornerSelector selector_;
   SteeredBrief brief_;
   UndistortionTable undistortion_;
+  cv::Mat blind_;    // CV_8UC1, 1 where not Camera::CanSee; empty when the camera can see everywhere
   cv::Mat blurred_;  // CV_8UC1, the memory of Level::blurred
   std::vector<Level> levels_;
   std::vector<double> weights_;  // share of the features: 1 / scale

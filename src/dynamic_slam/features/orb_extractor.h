@@ -22,7 +22,8 @@ class OrbExtractor {
   ~OrbExtractor();
 
   // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1 of the same size; a keypoint is dropped where
-  // it is not 0 (Eq. 11: 1 is dynamic). Replaces the content of *features.
+  // it is not 0 (Eq. 11: 1 is dynamic), and where the camera cannot see (Camera::CanSee). Replaces the
+  // content of *features.
   void Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet* features);
 
   // Wanted keypoints per image from now on; used to extract more until the map is initialised.

@@ -295,6 +295,57 @@ TEST(UndistortionTable, AgreesWithTheCameraUpToTheEdges) {
   }
 }
 
+Camera FisheyeCamera() {  // beyond 90 deg at the corners, 60 deg at about 200 px from the centre
+  Camera camera = TestCamera(640, 480);
+  camera.model = LensModel::kKannalaBrandt;
+  camera.fx = 192.3;
+  camera.fy = 191.8;
+  camera.cx = 322.1;
+  camera.cy = 237.6;
+  camera.k1 = 0.0041;
+  camera.k2 = 0.0007;
+  camera.k3 = -0.0021;
+  camera.k4 = 0.0002;
+  return camera;
+}
+
+TEST(OrbExtractor, WhatAFisheyeCannotSeeIsDroppedAndTheRestIsFull) {
+  const Camera camera = FisheyeCamera();
+  const FeatureSet features = Extract(Texture(640, 480, 14), camera);
+  EXPECT_EQ(features.size(), 1000u);
+  const auto [min_x, min_y, max_x, max_y] = camera.IdealBounds();
+  int beyond_55_deg = 0;
+  for (const Keypoint& k : features.keypoints) {
+    const double pixel = std::pow(1.2, k.octave);  // dropped by the pixel of the octave
+    const Eigen::Vector2d from_centre(k.raw_x - camera.cx, k.raw_y - camera.cy);
+    const Eigen::Vector2d nearer(k.raw_x - pixel * from_centre.normalized().x(),
+                                 k.raw_y - pixel * from_centre.normalized().y());
+    EXPECT_TRUE(camera.CanSee(nearer)) << k.raw_x << " " << k.raw_y;
+    EXPECT_GT(k.x, min_x - 4 * pixel);
+    EXPECT_LT(k.y, max_y + 4 * pixel);
+    const Eigen::Vector2d ideal = camera.Undistort({k.raw_x, k.raw_y});
+    EXPECT_NEAR(k.x, ideal.x(), 0.2);
+    EXPECT_NEAR(k.y, ideal.y(), 0.2);
+    const double tangent = camera.Unproject(ideal).head<2>().norm();
+    beyond_55_deg += tangent > std::tan(55 * 3.14159 / 180);
+  }
+  EXPECT_GT(beyond_55_deg, 50);  // and no more than what must be
+  EXPECT_GT(max_x - min_x, 600);
+  EXPECT_GT(max_y - min_y, 600);
+}
+
+TEST(OrbExtractor, AFisheyesBlindnessAndTheMaskAdd) {
+  const Camera camera = FisheyeCamera();
+  cv::Mat mask = cv::Mat::zeros(480, 640, CV_8UC1);
+  mask(cv::Rect(0, 0, 320, 480)) = 1;
+  const FeatureSet features = Extract(Texture(640, 480, 14), camera, mask);
+  EXPECT_GT(features.size(), 100u);
+  for (const Keypoint& k : features.keypoints) {
+    EXPECT_GT(k.raw_x, 317);
+    EXPECT_LT(k.raw_x, 530);
+  }
+}
+
 TEST(OrbExtractor, ABlankImageHasNoFeatures) {
   EXPECT_EQ(Extract(cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)), TestCamera(640, 480)).size(), 0u);
 }

@@ -3,29 +3,34 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
-
-#include <yaml-cpp/yaml.h>
+#include <span>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/base/text.h"
+#include "dynamic_slam/io/camera_import.h"
+#include "dynamic_slam/io/flat_yaml.h"
 
 namespace dynamic_slam {
 namespace {
 
 namespace fs = std::filesystem;
 
-// One list of a camera file's keys, for reading and writing.
+constexpr char kPinhole[] = "pinhole", kKannalaBrandt[] = "kannala_brandt";
+
+// One list of a camera file's keys, for reading and writing; the coefficients are those of the camera's
+// model.
 struct CameraFields {
   Camera camera;
-  std::string model = "pinhole";
+  std::string model;
+  bool all_keys = false;  // those of the other model too
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     constexpr double kMaxPx = 1e6;
     auto& c = self.camera;
     visit("name", c.name, OptionField{"", 0, 0, ""});
-    visit("model", self.model, OptionField{"", 0, 0, "Only pinhole."});
+    visit("model", self.model, OptionField{"", 0, 0, "pinhole or kannala_brandt (fisheye)."});
     visit("width", c.width, OptionField{"px", 1, 100000, "Size of the raw image."});
     visit("height", c.height, OptionField{"px", 1, 100000, ""});
     visit("fps", c.fps, OptionField{"Hz", 0, 1e5, "Frames per second; 0: unknown."});
@@ -34,15 +39,24 @@ struct CameraFields {
     visit("cx", c.cx,
           OptionField{"px", 0, kMaxPx, "Principal point; (0, 0) is the centre of the top left pixel."});
     visit("cy", c.cy, OptionField{"px", 0, kMaxPx, ""});
-    visit("k1", c.k1, OptionField{"", 0, 0, "Radial (k) and tangential (p) distortion, as in OpenCV."});
+    const bool is_fisheye = c.model == LensModel::kKannalaBrandt;
+    visit("k1", c.k1,
+          OptionField{"", 0, 0,
+                      is_fisheye ? "Distortion of Kannala and Brandt, as in cv::fisheye."
+                                 : "Radial (k) and tangential (p) distortion, as in OpenCV."});
     visit("k2", c.k2, OptionField{"", 0, 0, ""});
-    visit("p1", c.p1, OptionField{"", 0, 0, ""});
-    visit("p2", c.p2, OptionField{"", 0, 0, ""});
+    if (!is_fisheye || self.all_keys) {
+      visit("p1", c.p1, OptionField{"", 0, 0, ""});
+      visit("p2", c.p2, OptionField{"", 0, 0, ""});
+    }
     visit("k3", c.k3, OptionField{"", 0, 0, ""});
+    if (is_fisheye || self.all_keys) visit("k4", c.k4, OptionField{"", 0, 0, ""});
   }
 };
 
 constexpr std::string_view kRequiredKeys[] = {"width", "height", "fx", "fy", "cx", "cy"};
+constexpr std::string_view kRequiredFisheyeKeys[] = {"width", "height", "fx", "fy", "cx",
+                                                     "cy",    "k1",     "k2", "k3", "k4"};
 
 // Where camera files are looked for, best first.
 std::vector<fs::path> CameraFolders() {
@@ -57,35 +71,34 @@ std::vector<fs::path> CameraFolders() {
   return folders;
 }
 
-// Columns of "[a, b, c]" below `key`.
-std::vector<double> Numbers(const fs::path& file, const YAML::Node& root, const std::string& key,
-                            size_t count) {
-  const YAML::Node node = root[key];
-  std::vector<double> numbers;
-  if (node && node.IsSequence()) {
-    for (const auto& item : node) {
-      const auto number = item.IsScalar() ? ParseDouble(item.Scalar()) : std::nullopt;
-      if (number) numbers.push_back(*number);
-    }
-  }
-  if (numbers.size() != count) {
-    const std::string where =
-        node ? fmt::format("{}:{}", file.string(), node.Mark().line + 1) : file.string();
-    throw InputError(where, fmt::format("'{}' with {} numbers is wanted", key, count),
-                     "Correct the file, or give a camera file with --camera.");
-  }
-  return numbers;
-}
-
 }  // namespace
 
 Camera ReadCamera(const fs::path& file) {
-  CameraFields fields;
-  ReadYamlEntries(file, CollectOptions(fields), kRequiredKeys);
-  if (fields.model != "pinhole") {
-    throw InputError(file.string(), fmt::format("the model '{}' is not known", fields.model),
-                     "Use model: pinhole, with k1 k2 p1 p2 k3 where the lens distorts.");
+  FlatYaml yaml(file);
+  if (IsForeignCalibration(yaml)) {
+    throw InputError(
+        file.string(), "is the calibration file of another program",
+        fmt::format("Make a camera file of it: dynamic_slam config --import-camera {}", file.string()));
   }
+  const bool is_fisheye = yaml.Word("model") == kKannalaBrandt;
+  CameraFields fields{Camera(), kPinhole, true};
+  ReadYamlEntries(file, CollectOptions(fields),
+                  is_fisheye ? std::span<const std::string_view>(kRequiredFisheyeKeys) : kRequiredKeys);
+  if (fields.model != kPinhole && !is_fisheye) {
+    const std::vector<std::string> known = {kPinhole, kKannalaBrandt};
+    throw InputError(
+        yaml.Where("model"), fmt::format("the model '{}' is not known", fields.model),
+        fmt::format("Use model: pinhole, with k1 k2 p1 p2 k3 where the lens distorts, or, for a fisheye, "
+                    "model: kannala_brandt, with k1 k2 k3 k4.{}",
+                    DidYouMean(fields.model, known)));
+  }
+  for (const char* key : is_fisheye ? std::vector{"p1", "p2"} : std::vector{"k4"}) {
+    if (!yaml.Has(key)) continue;
+    yaml.AddProblem(key, fmt::format("{} is no coefficient of model: {}, but of model: {}", key, fields.model,
+                                     is_fisheye ? kPinhole : kKannalaBrandt));
+  }
+  yaml.ThrowProblems("Correct the model, or leave the keys of the other one out.");
+  fields.camera.model = is_fisheye ? LensModel::kKannalaBrandt : LensModel::kRadialTangential;
   if (fields.camera.name.empty()) fields.camera.name = file.stem().string();
   fields.camera.Validate();
   return fields.camera;
@@ -123,9 +136,8 @@ std::vector<std::string> KnownCameras() {
 }
 
 void WriteCamera(const fs::path& file, const Camera& camera) {
-  CameraFields fields;
-  fields.camera = camera;
-  WriteFileAtomically(file, EntriesToYaml(CollectOptions(fields)));
+  const CameraFields written{camera, camera.model == LensModel::kKannalaBrandt ? kKannalaBrandt : kPinhole};
+  WriteFileAtomically(file, OptionsToYaml(written));
 }
 
 void CheckCameraFits(const Camera& camera, const std::string& origin, const cv::Size& image_size) {
@@ -135,79 +147,6 @@ void CheckCameraFits(const Camera& camera, const std::string& origin, const cv::
       fmt::format("is for images of {} x {} px, these have {} x {} px", camera.width, camera.height,
                   image_size.width, image_size.height),
       "Choose another --camera, or scale fx, fy, cx and cy to this size in a camera file of your own.");
-}
-
-Camera ReadKittiCalibration(const fs::path& file, const cv::Size& image_size, double fps) {
-  for (const TextLine& line : ReadDataLines(file)) {
-    const std::vector<std::string_view> columns = SplitColumns(line.text);
-    if (columns[0] != "P0:") continue;
-    std::vector<double> p;
-    for (size_t i = 1; i < columns.size(); ++i) p.push_back(ParseDouble(columns[i]).value_or(0));
-    if (p.size() != 12) {
-      throw InputError(fmt::format("{}:{}", file.string(), line.number),
-                       fmt::format("P0 has {} numbers, 12 are wanted", p.size()),
-                       "Correct the file, or give a camera file with --camera.");
-    }
-    Camera camera;
-    camera.name = "calib.txt";
-    camera.width = image_size.width;
-    camera.height = image_size.height;
-    camera.fps = fps;
-    camera.fx = p[0];
-    camera.cx = p[2];
-    camera.fy = p[5];
-    camera.cy = p[6];
-    camera.Validate();
-    return camera;
-  }
-  throw InputError(file.string(), "has no line 'P0:'",
-                   "Correct the file, or give a camera file with --camera.");
-}
-
-Camera ReadEurocSensor(const fs::path& file) {
-  std::string text = ReadFile(file);
-  // OpenCV writes "%YAML:1.0", which is no YAML directive.
-  if (text.starts_with("%YAML:")) text[0] = '#';
-  YAML::Node root;
-  try {
-    root = YAML::Load(text);
-  } catch (const YAML::ParserException& e) {
-    throw InputError(fmt::format("{}:{}", file.string(), e.mark.line + 1),
-                     fmt::format("is not YAML: {}", e.msg), "");
-  }
-  if (!root.IsMap()) throw InputError(file.string(), "'key: value' lines are wanted", "");
-  const auto word = [&root](const char* key) {
-    const YAML::Node node = root[key];
-    return node && node.IsScalar() ? node.Scalar() : std::string();
-  };
-  const std::string model = word("camera_model"), distortion = word("distortion_model");
-  if (model != "pinhole" ||
-      (distortion != "radial-tangential" && distortion != "radtan" && distortion != "none")) {
-    throw InputError(
-        file.string(),
-        fmt::format("camera model '{}' with distortion '{}' is not supported", model, distortion),
-        "Only pinhole with radial-tangential distortion is: undistort the images to that first.");
-  }
-  Camera camera;
-  camera.name = "sensor.yaml";
-  const std::vector<double> size = Numbers(file, root, "resolution", 2);
-  const std::vector<double> intrinsics = Numbers(file, root, "intrinsics", 4);
-  camera.width = static_cast<int>(size[0]);
-  camera.height = static_cast<int>(size[1]);
-  camera.fps = ParseDouble(word("rate_hz")).value_or(0);
-  camera.fx = intrinsics[0];
-  camera.fy = intrinsics[1];
-  camera.cx = intrinsics[2];
-  camera.cy = intrinsics[3];
-  if (distortion != "none") {
-    const std::vector<double> k = Numbers(file, root, "distortion_coefficients", 4);
-    camera.k1 = k[0];
-    camera.k2 = k[1];
-    camera.p1 = k[2];
-    camera.p2 = k[3];
-  }
-  camera.Validate();
-  return camera;
 }
 
 }  // namespace dynamic_slam

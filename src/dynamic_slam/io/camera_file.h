@@ -10,8 +10,9 @@
 
 namespace dynamic_slam {
 
-// Reads a camera file (YAML): model (pinhole), width, height, fx, fy, cx, cy, and optionally name, fps, k1,
-// k2, p1, p2, k3. The camera is validated. Throws InputError with file:line for each problem.
+// Reads a camera file (YAML): model, width, height, fx, fy, cx, cy, and optionally name and fps. The model is
+// pinhole, with k1, k2, p1, p2, k3 where the lens distorts, or kannala_brandt, with k1, k2, k3, k4. The
+// camera is validated. Throws InputError with file:line for each problem.
 Camera ReadCamera(const std::filesystem::path& file);
 
 // `name_or_path` is a camera file, or the name of one: NAME.yaml in the first of
@@ -27,11 +28,5 @@ void WriteCamera(const std::filesystem::path& file, const Camera& camera);
 // Throws InputError when images of this size cannot be from that camera. origin: where the camera is from,
 // for the message.
 void CheckCameraFits(const Camera& camera, const std::string& origin, const cv::Size& image_size);
-
-// P0 of a KITTI calib.txt; that file holds neither size nor frame rate.
-Camera ReadKittiCalibration(const std::filesystem::path& file, const cv::Size& image_size, double fps);
-
-// cam0/sensor.yaml of a EuRoC data set.
-Camera ReadEurocSensor(const std::filesystem::path& file);
 
 }  // namespace dynamic_slam

@@ -28,6 +28,8 @@ void ExpectSame(const Camera& a, const Camera& b) {
   EXPECT_EQ(a.p1, b.p1);
   EXPECT_EQ(a.p2, b.p2);
   EXPECT_EQ(a.k3, b.k3);
+  EXPECT_EQ(a.k4, b.k4);
+  EXPECT_EQ(a.model, b.model);
 }
 
 TEST_F(CameraFile, ReadsWithoutDistortionAndNamesItAfterTheFile) {
@@ -107,52 +109,52 @@ TEST_F(CameraFile, ChecksTheImageSize) {
               HasSubstr("is for images of 640 x 480 px, these have 1241 x 376 px"));
 }
 
-TEST_F(CameraFile, ReadsKittiCalibration) {
-  const auto file = Write("calib.txt", "P0: 718.856 0 607.1928 0 0 718.9 185.2157 0 0 0 1 0\nP1: 1 2\n");
-  const Camera camera = ReadKittiCalibration(file, {1241, 376}, 10);
-  EXPECT_EQ(camera.fx, 718.856);
-  EXPECT_EQ(camera.fy, 718.9);
-  EXPECT_EQ(camera.cx, 607.1928);
-  EXPECT_EQ(camera.cy, 185.2157);
-  EXPECT_EQ(camera.width, 1241);
-  EXPECT_EQ(camera.fps, 10);
-  EXPECT_THAT(ErrorOf([&] {
-                ReadKittiCalibration(Write("a.txt", "P0: 1 2 3\n"), {9, 9}, 1);
-              }),
-              HasSubstr("a.txt:1: P0 has 3 numbers, 12 are wanted"));
-  EXPECT_THAT(ErrorOf([&] {
-                ReadKittiCalibration(Write("b.txt", "P1: 1\n"), {9, 9}, 1);
-              }),
-              HasSubstr("has no line 'P0:'"));
+constexpr char kFisheye[] =
+    "model: kannala_brandt\nwidth: 512\nheight: 512\nfx: 192.3\nfy: 191.8\ncx: 254.1\ncy: 257.6\n"
+    "k1: 0.0041\nk2: 0.0007\nk3: -0.0021\nk4: 0.0002\n";
+
+TEST_F(CameraFile, ReadsAndWritesFisheyes) {
+  const Camera camera = ReadCamera(Write("wide.yaml", kFisheye));
+  EXPECT_EQ(camera.model, LensModel::kKannalaBrandt);
+  EXPECT_EQ(camera.k1, 0.0041);
+  EXPECT_EQ(camera.k3, -0.0021);
+  EXPECT_EQ(camera.k4, 0.0002);
+  WriteCamera(folder_ / "copy.yaml", camera);
+  ExpectSame(ReadCamera(folder_ / "copy.yaml"), camera);
+  EXPECT_THAT(ReadFile(folder_ / "copy.yaml"), Not(HasSubstr("p1")));
 }
 
-constexpr char kSensor[] =
-    "%YAML:1.0\nsensor_type: camera\ncomment: VI-Sensor cam0\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, "
-    "0.0]\n"
-    "rate_hz: 20\nresolution: [752, 480]\ncamera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, "
-    "248.375]\n"
-    "distortion_model: radial-tangential\ndistortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, "
-    "1.76e-05]\n";
-
-TEST_F(CameraFile, ReadsEurocSensor) {
-  const Camera camera = ReadEurocSensor(Write("sensor.yaml", kSensor));
-  EXPECT_EQ(camera.width, 752);
-  EXPECT_EQ(camera.height, 480);
-  EXPECT_EQ(camera.fps, 20);
-  EXPECT_EQ(camera.fy, 457.296);
-  EXPECT_EQ(camera.k1, -0.28340811);
-  EXPECT_EQ(camera.p2, 1.76e-05);
-  EXPECT_EQ(camera.k3, 0);
+TEST_F(CameraFile, KeysOfTheOtherModelAreNamedWithTheirLines) {
+  const std::string fisheye =
+      ErrorOf([&] { ReadCamera(Write("a.yaml", std::string(kFisheye) + "p1: 0\np2: 0\n")); });
+  EXPECT_THAT(fisheye,
+              HasSubstr("a.yaml:12: p1 is no coefficient of model: kannala_brandt, but of model: pinhole"));
+  EXPECT_THAT(fisheye, HasSubstr("a.yaml:13: p2 is no"));
+  EXPECT_THAT(ErrorOf([&] { ReadCamera(Write("b.yaml", std::string(kPlain) + "k4: 0.1\n")); }),
+              HasSubstr("b.yaml:7: k4 is no coefficient of model: pinhole, but of model: kannala_brandt"));
 }
 
-TEST_F(CameraFile, RefusesOtherEurocSensors) {
-  std::string equidistant = kSensor;
-  equidistant.replace(equidistant.find("radial-tangential"), 17, "equidistant");
-  EXPECT_THAT(ErrorOf([&] { ReadEurocSensor(Write("a.yaml", equidistant)); }), HasSubstr("'equidistant'"));
-  std::string few = kSensor;
-  few.replace(few.find(", 248.375"), 9, "");
-  EXPECT_THAT(ErrorOf([&] { ReadEurocSensor(Write("b.yaml", few)); }),
-              HasSubstr("b.yaml:11: 'intrinsics' with 4 numbers is wanted"));
+TEST_F(CameraFile, MisspeltKeysAndModelsOfFisheyesAreSuggested) {
+  std::string text = kFisheye;
+  text.replace(text.find("k4"), 2, "K4");
+  const std::string error = ErrorOf([&] { ReadCamera(Write("a.yaml", text)); });
+  EXPECT_THAT(error, HasSubstr("a.yaml:11: unknown key 'K4'. Did you mean 'k4'?"));
+  EXPECT_THAT(error, HasSubstr("the key 'k4' is missing"));
+  text = kFisheye;
+  text.replace(text.find("kannala_brandt"), 14, "kanala_brandt");
+  EXPECT_THAT(ErrorOf([&] { ReadCamera(Write("b.yaml", text)); }),
+              HasSubstr("b.yaml:1: the model 'kanala_brandt' is not known"));
+  EXPECT_THAT(ErrorOf([&] { ReadCamera(Write("b.yaml", text)); }),
+              HasSubstr("Did you mean 'kannala_brandt'?"));
+  text = kFisheye;
+  text.replace(text.find("model"), 5, "modle");
+  EXPECT_THAT(ErrorOf([&] { ReadCamera(Write("c.yaml", text)); }), HasSubstr("Did you mean 'model'?"));
+}
+
+TEST_F(CameraFile, FilesOfOtherProgramsAreSentToTheImport) {
+  const auto file = Write("a.yaml", "%YAML:1.0\nCamera.fx: 500\n");
+  EXPECT_THAT(ErrorOf([&] { ReadCamera(file); }),
+              HasSubstr("dynamic_slam config --import-camera " + file.string()));
 }
 
 }  // namespace

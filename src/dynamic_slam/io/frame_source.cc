@@ -10,6 +10,7 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/camera_file.h"
+#include "dynamic_slam/io/camera_import.h"
 #include "dynamic_slam/io/image_file.h"
 #include "dynamic_slam/io/source_layout.h"
 
@@ -105,7 +106,7 @@ class ListedSource : public CheckedSource {
     if (fs::is_regular_file(listing_.folder / "camera.yaml"))
       return ReadCamera(listing_.folder / "camera.yaml");
     if (!fs::is_regular_file(listing_.calib)) return std::nullopt;
-    if (Layout() == "euroc") return ReadEurocSensor(listing_.calib);
+    if (Layout() == "euroc") return ImportCamera(listing_.calib);
     return ReadKittiCalibration(listing_.calib, ImageSize(), MeanFps());
   }
 

@@ -27,9 +27,10 @@ class LandmarkProjector {
   bool Project(const Eigen::Vector3d& x_in_world, const Eigen::Vector3f& normal, float min_distance,
                float max_distance, LandmarkProjection* projection) const;
 
-  // Inside the image, in ideal px.
+  // Inside the image and within the largest angle at which a fisheye's rays are used; px: ideal.
   bool IsInImage(const Eigen::Vector2d& px) const {
-    return px.x() >= bounds_[0] && px.y() >= bounds_[1] && px.x() <= bounds_[2] && px.y() <= bounds_[3];
+    return px.x() >= bounds_[0] && px.y() >= bounds_[1] && px.x() <= bounds_[2] && px.y() <= bounds_[3] &&
+           camera_.CanSeeIdeal(px);
   }
 
  private:
