@@ -137,8 +137,9 @@ class CliRunTest(unittest.TestCase):
 
     def test_interrupt_keeps_the_results(self):
         out = os.path.join(self.folder, "a")
-        process = subprocess.Popen([PROGRAM, "run", self.room, "--out", out], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
+        trace = os.path.join(self.folder, "trace.json")
+        process = subprocess.Popen([PROGRAM, "run", self.room, "--out", out, "--trace", trace],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         # The first line of progress tells that the run has begun.
         self.assertIn("frame", process.stderr.readline())
         process.send_signal(signal.SIGINT)
@@ -148,8 +149,35 @@ class CliRunTest(unittest.TestCase):
         summary = json.loads(read(out, "summary.json"))
         self.assertTrue(summary["interrupted"])
         self.assertLess(summary["frames_total"], FRAMES)
+        self.assertIn("tracking", [event["name"] for event in json.loads(read(trace))["traceEvents"]])
         self.assertEqual(len(data_lines(out, "trajectory.txt")),
                          summary["frames_tracked"] + summary["frames_backfilled"])
+
+    def test_trace_has_all_stages(self):
+        trace_file = os.path.join(self.folder, "new", "trace.json")
+        result = run_program("run", self.room, "--max-frames", "40", "--quiet", "--trace", trace_file,
+                             "--out", os.path.join(self.folder, "a"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        trace = json.loads(read(trace_file))
+        scopes = [event for event in trace["traceEvents"] if event["ph"] == "X"]
+        self.assertRegex(result.stdout, rf"trace: {trace_file} \({len(scopes)} events\)")
+        names = [event["name"] for event in scopes]
+        self.assertEqual(names.count("tracking"), 40)
+        self.assertEqual(names.count("tracking/orb"), 40)
+        for name in ("io/decode", "mapping", "mapping/cull landmarks", "mapping/create", "mapping/fuse",
+                     "mapping/adjust", "mapping/cull keyframes", "finish", "mapping/adjust all"):
+            self.assertIn(name, names)
+        self.assertIn("main", [event["args"]["name"] for event in trace["traceEvents"]
+                               if event["name"] == "thread_name"])
+        self.assertEqual(trace["otherData"]["dropped_events"], {})
+
+    def test_a_trace_that_cannot_be_written(self):
+        for path in ("/dev/null/trace.json", self.folder):
+            result = run_program("run", self.room, "--trace", path, "--out", os.path.join(self.folder, "a"))
+            self.assertEqual(result.returncode, 2, result.stdout)
+            self.assertIn(f"{path}: cannot be written", result.stderr)
+            self.assertNotIn("frame", result.stderr)
+            self.assertEqual(result.stdout, "")
 
     def test_demo(self):
         out = os.path.join(self.folder, "a")
@@ -166,12 +194,13 @@ class CliRunTest(unittest.TestCase):
 
     def test_every_subcommand_has_help(self):
         overview = run_program("--help").stdout
-        for command in ("run", "eval", "simulate", "demo"):
+        for command in ("run", "eval", "simulate", "demo", "config"):
             self.assertIn(command, overview)
             result = run_program(command, "--help")
             self.assertEqual((result.returncode, result.stderr), (0, ""))
             self.assertIn("--help", result.stdout)
-        for option in ("--camera", "--config", "--set", "--detector", "--mode", "--out", "--start", "--max-frames"):
+        for option in ("--camera", "--config", "--set", "--detector", "--mode", "--out", "--start", "--max-frames",
+                       "--trace"):
             self.assertIn(option, run_program("run", "--help").stdout)
 
 

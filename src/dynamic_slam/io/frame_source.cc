@@ -11,6 +11,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/source_layout.h"
 
@@ -31,6 +32,7 @@ bool IsTruncatedJpeg(const std::string& bytes) {
 
 // The image as CV_8UC1, or an empty one and the reason.
 cv::Mat DecodeGrey(const fs::path& file, std::string* reason) {
+  DS_TRACE("io/decode");
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return *reason = "the file is missing", cv::Mat();
   std::string bytes;
@@ -200,6 +202,7 @@ class VideoSource : public CheckedSource {
     if (ended_ || (end_ != 0 && index_ >= end_)) return false;
     image->timestamp_s = static_cast<double>(index_) / fps_;
     image->name = fmt::format("frame {}", index_);
+    DS_TRACE("io/decode");
     cv::Mat frame;
     if (!capture_.read(frame) || frame.empty()) {
       ended_ = true;

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "dynamic_slam/base/dispatch.h"
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/geometry/triangulation.h"
@@ -87,6 +88,7 @@ LandmarkFactory::LandmarkFactory(const Camera& camera, const MapperOptions& opti
     : camera_(camera), options_(options) {}
 
 std::vector<LandmarkId> LandmarkFactory::Create(KeyframeId id, Map* map) const {
+  DS_TRACE("mapping/create");
   std::vector<LandmarkId> created;
   const Keyframe& keyframe = map->keyframes().At(id);
   const size_t count = static_cast<size_t>(options_.triangulation_neighbours);

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/map/landmark_projector.h"
@@ -52,6 +53,7 @@ void FuseInto(const std::vector<LandmarkId>& landmarks, const Keyframe& target, 
 }  // namespace
 
 FusionCount FuseLandmarks(const Camera& camera, const MapperOptions& options, KeyframeId id, Map* map) {
+  DS_TRACE("mapping/fuse");
   FusionCount count;
   LandmarkProjector projector(camera, map->octave_scales());
   const Keyframe& keyframe = map->keyframes().At(id);

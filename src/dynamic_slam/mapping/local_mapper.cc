@@ -1,5 +1,6 @@
 #include "dynamic_slam/mapping/local_mapper.h"
 
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/landmark_fusion.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 
@@ -22,6 +23,7 @@ LocalMapper::LocalMapper(const Camera& camera, const MapperOptions& options, Map
     : camera_(camera), options_(options), map_(map), factory_(camera, options) {}
 
 MappingResult LocalMapper::Process(KeyframeId keyframe) {
+  DS_TRACE("mapping");
   MappingResult result;
   result.culled_landmarks = CullRecentLandmarks(keyframe);
   const std::vector<LandmarkId> created = factory_.Create(keyframe, map_);
@@ -38,6 +40,7 @@ BundleSummary LocalMapper::Finish() {
 }
 
 int LocalMapper::CullRecentLandmarks(KeyframeId current) {
+  DS_TRACE("mapping/cull landmarks");
   int culled = 0;
   size_t kept = 0;
   for (const LandmarkId id : recent_landmarks_) {
@@ -57,6 +60,7 @@ int LocalMapper::CullRecentLandmarks(KeyframeId current) {
 }
 
 int LocalMapper::CullRedundantKeyframes(KeyframeId current) {
+  DS_TRACE("mapping/cull keyframes");
   int culled = 0;
   const std::vector<CovisibleKeyframe> neighbours =
       map_->keyframes().At(current).BestCovisible(map_->keyframes().size());

@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include "dynamic_slam/base/trace.h"
+
 namespace dynamic_slam {
 namespace {
 
@@ -88,6 +90,7 @@ class MapBundle {
 }  // namespace
 
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId id, Map* map) {
+  DS_TRACE("mapping/adjust");
   std::vector<KeyframeId> local{id};
   for (const CovisibleKeyframe& other :
        map->keyframes().At(id).BestCovisible(static_cast<size_t>(options.local_keyframes - 1))) {
@@ -123,6 +126,7 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 }
 
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options, Map* map) {
+  DS_TRACE("mapping/adjust all");
   MapBundle bundle(map);
   bool first = true;
   map->keyframes().ForEach([&](const Keyframe& keyframe) {

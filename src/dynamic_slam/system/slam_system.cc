@@ -5,6 +5,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/trace.h"
 
 namespace dynamic_slam {
 namespace {
@@ -56,6 +57,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& grey, const c
 }
 
 void SlamSystem::Finish() {
+  DS_TRACE("finish");
   if (options_.final_bundle) mapper_.Finish();
 }
 
