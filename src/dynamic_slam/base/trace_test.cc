@@ -176,7 +176,7 @@ TEST_F(Trace, ThreadsThatHaveEndedKeepEventsAndName) {
 }
 
 TEST_F(Trace, IsWrittenWhileThreadsGoOn) {
-  StartTrace();
+  StartTrace(1000);
   std::atomic<bool> stop{false};
   std::vector<std::thread> threads;
   for (int i = 0; i < 3; ++i) {
