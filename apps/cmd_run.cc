@@ -70,6 +70,8 @@ void EndTrace(const std::string& file) {
 }
 
 void RunSource(const RunArguments& arguments, int* exit_code) {
+  TraceThreadName("main");
+  if (!arguments.trace.empty()) StartTrace();
   SystemOptions options;
   if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
   ApplySet(&options, arguments.assignments);
@@ -77,11 +79,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const Camera camera = ChooseCamera(arguments, *source);
   const std::filesystem::path out = OutputFolder(arguments);
   PrepareOutputFolder(out);
-  if (!arguments.trace.empty()) {
-    CheckCanBeWritten(arguments.trace);
-    TraceThreadName("main");
-    StartTrace();
-  }
+  if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
 
   SlamSystem system(camera, options);
   RunConsole console(arguments.quiet);

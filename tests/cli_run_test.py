@@ -164,7 +164,8 @@ class CliRunTest(unittest.TestCase):
         names = [event["name"] for event in scopes]
         self.assertEqual(names.count("tracking"), 40)
         self.assertEqual(names.count("tracking/orb"), 40)
-        for name in ("io/decode", "mapping", "mapping/cull landmarks", "mapping/create", "mapping/fuse",
+        self.assertEqual(names.count("io/decode"), 40)
+        for name in ("mapping", "mapping/cull landmarks", "mapping/create", "mapping/fuse",
                      "mapping/adjust", "mapping/cull keyframes", "finish", "mapping/adjust all"):
             self.assertIn(name, names)
         self.assertIn("main", [event["args"]["name"] for event in trace["traceEvents"]
