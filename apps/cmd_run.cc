@@ -11,6 +11,8 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/text.h"
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/sequence_runner.h"
@@ -29,6 +31,7 @@ struct RunArguments {
   std::string detector = "none";
   std::string mode = "offline";
   std::string out;
+  std::string trace;
   FrameSourceOptions source_options;
   bool quiet = false;
 };
@@ -59,7 +62,16 @@ std::filesystem::path OutputFolder(const RunArguments& arguments) {
   return std::filesystem::path("out") / source.filename();
 }
 
+void EndTrace(const std::string& file) {
+  const TraceSummary trace = WriteTrace(file);
+  const std::string dropped =
+      trace.dropped > 0 ? fmt::format(", {} more dropped for want of room", trace.dropped) : "";
+  fmt::print("trace: {} ({} events{})\n", file, trace.events, dropped);
+}
+
 void RunSource(const RunArguments& arguments, int* exit_code) {
+  TraceThreadName("main");
+  if (!arguments.trace.empty()) StartTrace();
   SystemOptions options;
   if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
   ApplySet(&options, arguments.assignments);
@@ -68,6 +80,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::filesystem::path out = OutputFolder(arguments);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
   PrepareOutputFolder(out);
+  if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   RunConsole console(arguments.quiet);
   RunSummary summary = RunSequence(*source, system, console.Control());
   summary.source = arguments.source;
@@ -77,6 +90,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   WriteResults(out, system, summary);
   PrintSummary(summary);
   ReportTruth(arguments.source, system.FrameTrajectory(), out);
+  if (!arguments.trace.empty()) EndTrace(arguments.trace);
   fmt::print("results: {}\n", out.string());
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
@@ -108,6 +122,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->check(CLI::IsMember({"offline", "realtime"}))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
+  command->add_option("--trace", a.trace,
+                      "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
   command->add_option("--start", a.source_options.start, "Frames to skip first")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--max-frames", a.source_options.max_frames, "Frames to run at most (0: all)")

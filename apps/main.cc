@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "cmd_config.h"
 #include "cmd_demo.h"
 #include "cmd_eval.h"
 #include "cmd_run.h"
@@ -28,6 +29,7 @@ int main(int argc, char** argv) {
   dynamic_slam::AddEvalCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);
+  dynamic_slam::AddConfigCommand(app);
   try {
     app.parse(argc, argv);  // runs the subcommand
     return exit_code;

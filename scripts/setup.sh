@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Installs the packages of packages.txt that are missing. Does nothing, and needs no rights, when there are none.
+# setup.sh [LIST...]: installs the packages of packages.txt, and of the lists given, that are missing. Does nothing, and
+# needs no rights, when there are none.
 set -euo pipefail
-packages_file="$(dirname "${BASH_SOURCE[0]}")/packages.txt"
-mapfile -t wanted < <(sed 's/#.*//' "$packages_file" | tr -s '[:space:]' '\n' | sed '/^$/d')
+lists=("$(dirname "${BASH_SOURCE[0]}")/packages.txt" "$@")
+mapfile -t wanted < <(sed 's/#.*//' "${lists[@]}" | tr -s '[:space:]' '\n' | sed '/^$/d')
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   echo "This is not Debian: nothing is installed. Needed are the equivalents of: ${wanted[*]}" >&2

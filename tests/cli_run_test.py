@@ -152,7 +152,7 @@ class CliRunTest(unittest.TestCase):
                                 "Choose a part")
         self.assert_input_error([self.room, "--set", "image.bayer=rgb"], "image.bayer", "'rgb'", "rggb")
         self.assert_input_error([self.room, "--detector", "magic"], "--detector")
-        self.assert_input_error([self.room, "--mode", "realtime"], "--mode")
+        self.assert_input_error([self.room, "--mode", "fast"], "--mode")
 
     def test_a_folder_that_cannot_be_written_is_an_input_error(self):
         # Below a file and in /proc not even root can.
@@ -199,8 +199,9 @@ class CliRunTest(unittest.TestCase):
 
     def test_interrupt_keeps_the_results(self):
         out = os.path.join(self.folder, "a")
-        process = subprocess.Popen([PROGRAM, "run", self.room, "--out", out], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
+        trace = os.path.join(self.folder, "trace.json")
+        process = subprocess.Popen([PROGRAM, "run", self.room, "--out", out, "--trace", trace],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         # The first line of progress tells that the run has begun.
         self.assertIn("frame", process.stderr.readline())
         process.send_signal(signal.SIGINT)
@@ -210,8 +211,38 @@ class CliRunTest(unittest.TestCase):
         summary = json.loads(read(out, "summary.json"))
         self.assertTrue(summary["interrupted"])
         self.assertLess(summary["frames_total"], FRAMES)
+        self.assertIn("tracking", [event["name"] for event in json.loads(read(trace))["traceEvents"]])
         self.assertEqual(len(data_lines(out, "trajectory.txt")),
                          summary["frames_tracked"] + summary["frames_backfilled"])
+
+    def test_trace_has_all_stages(self):
+        trace_file = os.path.join(self.folder, "new", "trace.json")
+        result = run_program("run", self.room, "--max-frames", "40", "--quiet", "--trace", trace_file,
+                             "--out", os.path.join(self.folder, "a"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        trace = json.loads(read(trace_file))
+        scopes = [event for event in trace["traceEvents"] if event["ph"] == "X"]
+        counters = [event["name"] for event in trace["traceEvents"] if event["ph"] == "C"]
+        self.assertEqual(counters.count("keyframes waiting"), 40)
+        self.assertRegex(result.stdout, rf"trace: {trace_file} \({len(scopes) + len(counters)} events\)")
+        names = [event["name"] for event in scopes]
+        self.assertEqual(names.count("tracking"), 40)
+        self.assertEqual(names.count("tracking/orb"), 40)
+        self.assertEqual(names.count("io/decode"), 40)
+        for name in ("mapping", "mapping/cull landmarks", "mapping/create", "mapping/fuse",
+                     "mapping/adjust", "mapping/cull keyframes", "finish", "mapping/adjust all"):
+            self.assertIn(name, names)
+        self.assertIn("main", [event["args"]["name"] for event in trace["traceEvents"]
+                               if event["name"] == "thread_name"])
+        self.assertEqual(trace["otherData"]["dropped_events"], {})
+
+    def test_a_trace_that_cannot_be_written(self):
+        for path in ("/dev/null/trace.json", self.folder):
+            result = run_program("run", self.room, "--trace", path, "--out", os.path.join(self.folder, "a"))
+            self.assertEqual(result.returncode, 2, result.stdout)
+            self.assertIn(f"{path}: cannot be written", result.stderr)
+            self.assertNotIn("frame", result.stderr)
+            self.assertEqual(result.stdout, "")
 
     def test_demo(self):
         out = os.path.join(self.folder, "a")
@@ -228,12 +259,13 @@ class CliRunTest(unittest.TestCase):
 
     def test_every_subcommand_has_help(self):
         overview = run_program("--help").stdout
-        for command in ("run", "eval", "simulate", "demo"):
+        for command in ("run", "eval", "simulate", "demo", "config"):
             self.assertIn(command, overview)
             result = run_program(command, "--help")
             self.assertEqual((result.returncode, result.stderr), (0, ""))
             self.assertIn("--help", result.stdout)
-        for option in ("--camera", "--config", "--set", "--detector", "--mode", "--out", "--start", "--max-frames"):
+        for option in ("--camera", "--config", "--set", "--detector", "--mode", "--out", "--start", "--max-frames",
+                       "--trace"):
             self.assertIn(option, run_program("run", "--help").stdout)
 
 

@@ -89,7 +89,7 @@ TEST_F(SystemTest, AFisheyeIsFollowedThroughTheRoom) {
   EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
             0.005 * PathLength(ToPoseList(room.truth())));
   double farthest_px = 0;
-  run.system->map().keyframes().ForEach([&](const Keyframe& keyframe) {
+  run.system->map().Read()->keyframes().ForEach([&](const Keyframe& keyframe) {
     for (const Keypoint& keypoint : keyframe.features().keypoints) {
       farthest_px = std::max<double>(farthest_px, std::hypot(keypoint.raw_x - 320.1, keypoint.raw_y - 247.6));
     }

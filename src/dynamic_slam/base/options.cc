@@ -45,44 +45,26 @@ std::optional<Value> Parse(const OptionEntry& entry, const std::string& text) {
       entry.value);
 }
 
-std::string_view WantedType(const OptionEntry& entry) {
-  constexpr std::string_view kNames[] = {"true or false", "a whole number", "a number",
-                                         "a whole number that is not negative", "a text"};
-  return kNames[entry.value.index()];
-}
-
-bool HasRange(const OptionEntry& entry) {
-  const bool number =
-      !std::holds_alternative<bool*>(entry.value) && !std::holds_alternative<std::string*>(entry.value);
-  return number && entry.field.low < entry.field.high;
-}
-
-std::string WithUnit(const std::string& number, const OptionField& field) {
-  return field.unit.empty() ? number : fmt::format("{} {}", number, field.unit);
-}
-
-std::string RangeText(const OptionField& field) {
-  return WithUnit(fmt::format("{} to {}", field.low, field.high), field);
-}
-
-// What is wrong with the value, or "".
-std::string RangeProblem(const OptionEntry& entry, const Value& value) {
+// What is wrong with a value of the right type, or "".
+std::string ValueProblem(const OptionEntry& entry, const Value& value) {
   return std::visit(
       [&entry](const auto& v) -> std::string {
-        if constexpr (std::is_arithmetic_v<std::decay_t<decltype(v)>>) {
+        const std::span<const std::string_view> words = entry.field.words;
+        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) {
+          if (!words.empty() && std::find(words.begin(), words.end(), v) == words.end()) {
+            return fmt::format("{} must be {}, is '{}'.{}", entry.key, RangeText(entry), v,
+                               DidYouMean(v, std::vector<std::string>(words.begin(), words.end())));
+          }
+        } else if constexpr (std::is_arithmetic_v<std::decay_t<decltype(v)>>) {
           const double number = static_cast<double>(v);
           if (!std::isfinite(number)) return fmt::format("{} is {}, which is not finite", entry.key, v);
           if (HasRange(entry) && !(number >= entry.field.low && number <= entry.field.high)) {
-            return fmt::format("{} is {}, outside its range {}", entry.key, v, RangeText(entry.field));
+            return fmt::format("{} is {}, outside its range {}", entry.key, v, RangeText(entry));
           }
         }
         return "";
       },
       value);
-}
-
-Value ValueOf(const OptionEntry& entry) {
-  return std::visit([](const auto* target) { return Value(*target); }, entry.value);
 }
 
 void Assign(const OptionEntry& entry, const Value& value) {
@@ -93,60 +75,55 @@ void Assign(const OptionEntry& entry, const Value& value) {
 // Collects checked values and problems, and applies the values only when there is no problem.
 class Assignments {
  public:
-  explicit Assignments(std::span<const OptionEntry> entries) : entries_(entries) {
-    for (const OptionEntry& entry : entries) {
-      keys_.push_back(entry.key);
-      for (size_t dot = entry.key.find('.'); dot != std::string::npos; dot = entry.key.find('.', dot + 1)) {
-        const std::string section = entry.key.substr(0, dot);
-        if (std::find(sections_.begin(), sections_.end(), section) == sections_.end()) {
-          sections_.push_back(section);
-        }
-      }
-    }
-  }
+  explicit Assignments(std::span<const OptionEntry> entries) : entries_(entries) {}
 
   bool IsSection(const std::string& key) const {
-    return std::find(sections_.begin(), sections_.end(), key) != sections_.end();
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [&key](const OptionEntry& entry) { return IsBelow(entry.key, key); });
   }
 
   const OptionEntry* Find(const std::string& key) const {
-    const auto found = std::find(keys_.begin(), keys_.end(), key);
-    return found == keys_.end() ? nullptr : &entries_[static_cast<size_t>(found - keys_.begin())];
+    const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                    [&key](const OptionEntry& entry) { return entry.key == key; });
+    return found == entries_.end() ? nullptr : &*found;
   }
-
-  bool Has(const std::string& key) const { return values_.contains(key); }
 
   void Set(const std::string& where, const OptionEntry& entry, const std::string& text) {
     const std::optional<Value> value = Parse(entry, text);
     if (!value)
       return Problem(where, fmt::format("{} must be {}, is '{}'", entry.key, WantedType(entry), text));
-    const std::string problem = RangeProblem(entry, *value);
+    const std::string problem = ValueProblem(entry, *value);
     if (!problem.empty()) return Problem(where, problem);
     values_[entry.key] = *value;
   }
 
   void UnknownKey(const std::string& where, const std::string& key) {
-    std::vector<std::string> candidates = keys_;
-    candidates.insert(candidates.end(), sections_.begin(), sections_.end());
-    Problem(where, fmt::format("unknown key '{}'.{}", key, DidYouMean(key, candidates)));
+    Problem(where, fmt::format("unknown key '{}'.{}", key, DidYouMeanKey(entries_, key)));
   }
 
   void Problem(const std::string& where, const std::string& text) {
     problems_.push_back(fmt::format("{}: {}", where, text));
   }
 
-  void Apply(const std::string& what, const std::string& remedy) const {
+  // Returns the keys that are set, in field order.
+  std::vector<std::string> Apply(const std::string& what, const std::string& remedy) const {
     if (!problems_.empty()) {
       const std::string count =
           problems_.size() == 1 ? "1 problem" : fmt::format("{} problems", problems_.size());
       throw InputError(what, fmt::format("{}\n  {}", count, fmt::join(problems_, "\n  ")), remedy);
     }
-    for (const auto& [key, value] : values_) Assign(*Find(key), value);
+    std::vector<std::string> keys;
+    for (const OptionEntry& entry : entries_) {
+      const auto found = values_.find(entry.key);
+      if (found == values_.end()) continue;
+      Assign(entry, found->second);
+      keys.push_back(entry.key);
+    }
+    return keys;
   }
 
  private:
   std::span<const OptionEntry> entries_;
-  std::vector<std::string> keys_, sections_;
   std::map<std::string, Value> values_;
   std::vector<std::string> problems_;
 };
@@ -180,37 +157,26 @@ void ReadMap(const std::string& file, const YAML::Node& map, const std::string& 
   }
 }
 
-// A YAML text in double quotes.
-std::string Quoted(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      quoted += '\\';
-      quoted += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      quoted += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + '"';
-}
-
-std::string ValueText(const OptionEntry& entry) {
-  return std::visit(
-      [](const auto& v) -> std::string {
-        using T = std::decay_t<decltype(v)>;
-        if constexpr (std::is_same_v<T, std::string>) return Quoted(v);
-        if constexpr (std::is_same_v<T, double>) return ShortestDouble(v);
-        if constexpr (!std::is_same_v<T, std::string>) return fmt::format("{}", v);
-      },
-      ValueOf(entry));
-}
-
 }  // namespace
 
-void ReadYamlEntries(const std::filesystem::path& file, std::span<const OptionEntry> entries,
-                     std::span<const std::string_view> required) {
+bool IsBelow(std::string_view key, std::string_view section) {
+  return key.size() > section.size() && key.starts_with(section) && key[section.size()] == '.';
+}
+
+std::string DidYouMeanKey(std::span<const OptionEntry> entries, std::string_view key) {
+  std::vector<std::string> candidates;
+  for (const OptionEntry& entry : entries) candidates.push_back(entry.key);
+  for (const OptionEntry& entry : entries) {
+    for (size_t dot = entry.key.find('.'); dot != std::string::npos; dot = entry.key.find('.', dot + 1)) {
+      candidates.push_back(entry.key.substr(0, dot));
+    }
+  }
+  return DidYouMean(key, candidates);
+}
+
+std::vector<std::string> ReadYamlEntries(const std::filesystem::path& file,
+                                         std::span<const OptionEntry> entries,
+                                         std::span<const std::string_view> required) {
   const std::string name = file.string();
   YAML::Node root;
   try {
@@ -231,7 +197,7 @@ void ReadYamlEntries(const std::filesystem::path& file, std::span<const OptionEn
       assignments.Problem(name, fmt::format("the key '{}' is missing", key));
     }
   }
-  assignments.Apply(name, "Correct the file and try again.");
+  return assignments.Apply(name, "Correct the file and try again.");
 }
 
 void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::string> settings) {
@@ -256,38 +222,11 @@ void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::
   assignments.Apply("--set", "A run's config.yaml lists every key with its range.");
 }
 
-std::string EntriesToYaml(std::span<const OptionEntry> entries) {
-  std::string yaml;
-  std::vector<std::string> open;  // the sections around the previous key
-  for (const OptionEntry& entry : entries) {
-    std::vector<std::string> path;
-    for (size_t begin = 0; begin <= entry.key.size();) {
-      const size_t end = std::min(entry.key.find('.', begin), entry.key.size());
-      path.push_back(entry.key.substr(begin, end - begin));
-      begin = end + 1;
-    }
-    const std::string name = path.back();
-    path.pop_back();
-    size_t depth = 0;
-    while (depth < std::min(path.size(), open.size()) && path[depth] == open[depth]) ++depth;
-    for (; depth < path.size(); ++depth) yaml += fmt::format("{:{}}{}:\n", "", 2 * depth, path[depth]);
-    const std::string range = HasRange(entry)            ? fmt::format(" [{}]", RangeText(entry.field))
-                              : entry.field.unit.empty() ? std::string()
-                                                         : fmt::format(" [{}]", entry.field.unit);
-    if (!entry.field.help.empty() || !range.empty()) {
-      yaml += fmt::format("{:{}}#{}{}{}\n", "", 2 * depth, entry.field.help.empty() ? "" : " ",
-                          entry.field.help, range);
-    }
-    yaml += fmt::format("{:{}}{}: {}\n", "", 2 * depth, name, ValueText(entry));
-    open = path;
-  }
-  return yaml;
-}
-
 void CheckEntryRanges(std::span<const OptionEntry> entries) {
   Assignments assignments(entries);
   for (const OptionEntry& entry : entries) {
-    const std::string problem = RangeProblem(entry, ValueOf(entry));
+    const std::string problem =
+        ValueProblem(entry, std::visit([](const auto* v) { return Value(*v); }, entry.value));
     if (!problem.empty()) assignments.Problem("option", problem);
   }
   assignments.Apply("options", "Set each within its range.");

@@ -46,25 +46,51 @@ std::vector<OptionEntry> CollectOptions(Options& options) {
   return entries;
 }
 
-// Reads values from a YAML file: nested maps or dotted keys; absent keys keep their value. Throws InputError
-// that lists every problem with file:line (unknown key with a suggestion, wrong type, out of range, given
-// twice, key of `required` absent) and then leaves all values unchanged.
-void ReadYamlEntries(const std::filesystem::path& file, std::span<const OptionEntry> entries,
-                     std::span<const std::string_view> required = {});
+// Whether the dotted key is in the section, or in one of its sections.
+bool IsBelow(std::string_view key, std::string_view section);
+
+// " Did you mean 'tracker.pose'?" or "": the key or section closest to a misspelt one.
+std::string DidYouMeanKey(std::span<const OptionEntry> entries, std::string_view key);
+
+// Reads values from a YAML file: nested maps or dotted keys; absent keys keep their value. Returns the keys
+// that the file sets, in field order. Throws InputError that lists every problem with file:line (unknown key
+// with a suggestion, wrong type, out of range, given twice, key of `required` absent) and then leaves all
+// values unchanged.
+std::vector<std::string> ReadYamlEntries(const std::filesystem::path& file,
+                                         std::span<const OptionEntry> entries,
+                                         std::span<const std::string_view> required = {});
 
 // The same for assignments "key=value" from the command line; later ones win.
 void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::string> assignments);
 
-// All entries as YAML with a comment (help, unit, range) above each key, in field order. Numbers read back
-// identically.
+// Whether it is a number with a range.
+bool HasRange(const OptionEntry& entry);
+
+// "true or false", "a whole number", "a number", ...
+std::string_view WantedType(const OptionEntry& entry);
+
+// The value as in a YAML file; numbers read back identically.
+std::string ValueText(const OptionEntry& entry);
+
+// What the value may be, as far as there is a limit: "1 to 200 px", "offline or realtime", or "".
+std::string RangeText(const OptionEntry& entry);
+
+// All entries as YAML with a comment (help, unit, range) above each key, in field order.
 std::string EntriesToYaml(std::span<const OptionEntry> entries);
+
+// Sentence, type, range and value of the entry `key`, or of all entries of the section `key`. Throws
+// InputError with a suggestion when there is neither.
+std::string ExplainEntries(std::span<const OptionEntry> entries, const std::string& key);
+
+// A table in Markdown for each section: key, value as the default, unit, range, sentence.
+std::string EntriesToMarkdown(std::span<const OptionEntry> entries);
 
 // Throws InputError that lists every value outside its range. For options that were set in code.
 void CheckEntryRanges(std::span<const OptionEntry> entries);
 
 template <class Options>
-void LoadOptions(const std::filesystem::path& file, Options* options) {
-  ReadYamlEntries(file, CollectOptions(*options));
+std::vector<std::string> LoadOptions(const std::filesystem::path& file, Options* options) {
+  return ReadYamlEntries(file, CollectOptions(*options));
 }
 
 template <class Options>

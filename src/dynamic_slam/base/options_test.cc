@@ -15,6 +15,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
+constexpr std::string_view kModes[] = {"offline", "realtime", "replay"};
+
 struct InnerOptions {
   int features = 1000;
   double scale = 1.2;
@@ -40,6 +42,15 @@ struct OuterOptions {
     visit("quick", self.quick, OptionField{"", 0, 0, "Start quickly."});
     visit("note", self.note, OptionField{"", 0, 0, "Free text."});
     visit("radius", self.radius, OptionField{"px", 0, 100, "Search radius."});
+  }
+};
+
+struct WordOptions {
+  std::string mode = "offline";
+
+  template <class Self, class Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("mode", self.mode, OptionField{"", 0, 0, "How time passes.", kModes});
   }
 };
 
@@ -185,6 +196,88 @@ TEST_F(Options, WhatIsWrittenReadsBackIdentically) {
   EXPECT_EQ(options_.quick, written.quick);
   EXPECT_EQ(options_.orb.scale, written.orb.scale);
   EXPECT_EQ(OptionsToYaml(options_), OptionsToYaml(written));
+}
+
+TEST_F(Options, ReturnsTheKeysThatAFileSetsInFieldOrder) {
+  WriteFileAtomically(file_ = std::filesystem::path(::testing::TempDir()) / "dynamic_slam_options_keys.yaml",
+                      "radius: 7.5\norb:\n  features: 60\n");
+  EXPECT_THAT(LoadOptions(file_, &options_), ElementsAre("orb.features", "radius"));
+}
+
+TEST_F(Options, AWordMustBeInTheList) {
+  WordOptions words;
+  const auto error = [](const auto& function) -> std::string {
+    try {
+      function();
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(error([&] { ApplySet(&words, "mode=realtmie"); }),
+              HasSubstr("mode must be offline, realtime or replay, is 'realtmie'. Did you mean 'realtime'?"));
+  EXPECT_THAT(error([&] { ApplySet(&words, "mode="); }), HasSubstr("is ''."));
+  EXPECT_EQ(words.mode, "offline");
+  ApplySet(&words, "mode=replay");
+  EXPECT_EQ(words.mode, "replay");
+  CheckOptions(words);
+  EXPECT_THAT(OptionsToYaml(words), HasSubstr("# How time passes. [offline, realtime or replay]\n"));
+  words.mode = "other";
+  EXPECT_THAT(error([&] { CheckOptions(words); }), HasSubstr("mode must be offline, realtime or replay"));
+
+  const std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) / "dynamic_slam_options_words.yaml";
+  WriteFileAtomically(file, "\nmode: often\n");
+  EXPECT_THAT(error([&] { LoadOptions(file, &words); }),
+              HasSubstr(file.string() + ":2: mode must be offline"));
+}
+
+TEST_F(Options, ExplainsAKeyOrASection) {
+  const std::vector<OptionEntry> entries = CollectOptions(options_);
+  EXPECT_EQ(ExplainEntries(entries, "radius"),
+            "radius\n"
+            "  Search radius.\n"
+            "  a number: 0 to 100 px, default 7.5 px\n");
+  EXPECT_EQ(ExplainEntries(entries, "orb"),
+            "orb.features\n"
+            "  Keypoints wanted.\n"
+            "  a whole number: 50 to 20000, default 1000\n"
+            "\n"
+            "orb.scale\n"
+            "  Scale between levels.\n"
+            "  a number: 1.05 to 2, default 1.2\n");
+  EXPECT_THAT(ExplainEntries(entries, "note"), HasSubstr("a text, default \"plain\"\n"));
+  WordOptions words;
+  EXPECT_THAT(ExplainEntries(CollectOptions(words), "mode"),
+              HasSubstr("a text: offline, realtime or replay, default \"offline\"\n"));
+  for (const auto& [wrong, suggestion] :
+       {std::pair{"rob", "'orb'?"}, std::pair{"orb.scael", "'orb.scale'?"}}) {
+    try {
+      ExplainEntries(entries, wrong);
+      FAIL() << wrong;
+    } catch (const InputError& e) {
+      EXPECT_THAT(e.what(), HasSubstr(std::string("Did you mean ") + suggestion));
+    }
+  }
+  EXPECT_THROW(ExplainEntries(entries, "or"), InputError);  // not a section
+  EXPECT_THROW(ExplainEntries(entries, ""), InputError);
+}
+
+TEST_F(Options, MarkdownHasATableForEachSection) {
+  EXPECT_EQ(EntriesToMarkdown(CollectOptions(options_)),
+            "## General\n\n"
+            "| key | default | unit | range | what it does |\n|---|---|---|---|---|\n"
+            "| `seed` | `1` |  | a whole number that is not negative | Seed of the random numbers. |\n"
+            "| `quick` | `true` |  | true or false | Start quickly. |\n"
+            "| `note` | `\"plain\"` |  | a text | Free text. |\n"
+            "| `radius` | `7.5` | px | 0 to 100 | Search radius. |\n"
+            "\n"
+            "## `orb`\n\n"
+            "| key | default | unit | range | what it does |\n|---|---|---|---|---|\n"
+            "| `orb.features` | `1000` |  | 50 to 20000 | Keypoints wanted. |\n"
+            "| `orb.scale` | `1.2` |  | 1.05 to 2 | Scale between levels. |\n");
+  WordOptions words;
+  EXPECT_THAT(EntriesToMarkdown(CollectOptions(words)), HasSubstr("| `offline`, `realtime` or `replay` |"));
 }
 
 TEST_F(Options, ChecksRangesOfValuesSetInCode) {

@@ -77,6 +77,21 @@ std::string ShortestDouble(double value) {
   return text;
 }
 
+std::string Quoted(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      quoted += '\\';
+      quoted += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      quoted += fmt::format("\\u{:04x}", static_cast<unsigned char>(c));
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
 std::string_view Trim(std::string_view text) {
   const size_t begin = text.find_first_not_of(kSpace);
   if (begin == std::string_view::npos) return {};
@@ -124,7 +139,10 @@ std::string ReadFile(const std::filesystem::path& file, const std::string& remed
   return content;
 }
 
-void WriteFileAtomically(const std::filesystem::path& file, std::string_view content) {
+namespace {
+
+// Writes FILE.tmp, whose path it returns.
+std::filesystem::path WriteTemporary(const std::filesystem::path& file, std::string_view content) {
   std::error_code error;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
   std::filesystem::path temporary = file;
@@ -138,12 +156,28 @@ void WriteFileAtomically(const std::filesystem::path& file, std::string_view con
     std::filesystem::remove(temporary, error);
     throw InputError(file.string(), reason, "Choose a folder that can be written and has space left.");
   }
+  return temporary;
+}
+
+}  // namespace
+
+void WriteFileAtomically(const std::filesystem::path& file, std::string_view content) {
+  const std::filesystem::path temporary = WriteTemporary(file, content);
+  std::error_code error;
   std::filesystem::rename(temporary, file, error);
   if (error) {
     const std::string reason = fmt::format("cannot be written ({})", error.message());
     std::filesystem::remove(temporary, error);
     throw InputError(file.string(), reason, "Choose another name.");
   }
+}
+
+void CheckCanBeWritten(const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error)) {
+    throw InputError(file.string(), "cannot be written (it is a folder)", "Choose another name.");
+  }
+  std::filesystem::remove(WriteTemporary(file, ""), error);
 }
 
 }  // namespace dynamic_slam

@@ -25,6 +25,9 @@ std::optional<double> ParseDouble(std::string_view text);
 // integer.
 std::string ShortestDouble(double value);
 
+// The text in double quotes, as YAML and JSON have it.
+std::string Quoted(std::string_view text);
+
 std::string_view Trim(std::string_view text);
 
 // Columns separated by white space and by any of `more_separators`.
@@ -46,5 +49,8 @@ std::string ReadFile(const std::filesystem::path& file, const std::string& remed
 // Writes FILE.tmp and renames it to FILE, so that FILE is never half written; makes the folder. Throws
 // InputError.
 void WriteFileAtomically(const std::filesystem::path& file, std::string_view content);
+
+// Throws InputError when WriteFileAtomically would, as far as that can be known before; makes the folder.
+void CheckCanBeWritten(const std::filesystem::path& file);
 
 }  // namespace dynamic_slam

@@ -103,6 +103,12 @@ TEST(WriteFileAtomically, FailsWithTheReason) {
   EXPECT_THROW(WriteFileAtomically(folder / "file" / "below.txt", "y"), InputError);
   std::filesystem::create_directories(folder / "taken" / "inside");
   EXPECT_THROW(WriteFileAtomically(folder / "taken", "y"), InputError);
+  EXPECT_THROW(CheckCanBeWritten(folder / "file" / "below.txt"), InputError);
+  EXPECT_THROW(CheckCanBeWritten(folder / "taken"), InputError);
+  CheckCanBeWritten(folder / "new" / "file");
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "new"));
+  CheckCanBeWritten(folder / "file");
+  EXPECT_EQ(ReadFile(folder / "file"), "x");
   EXPECT_FALSE(std::filesystem::exists(folder / "taken.tmp"));
 }
 

@@ -2,11 +2,9 @@
 
 #include <utility>
 
-#include <pthread.h>
-
 namespace dynamic_slam {
 
-Worker::Worker(std::string name) : name_(std::move(name)), thread_([this] { Run(); }) {}
+Worker::Worker(TraceName name) : name_(name), thread_([this] { Run(); }) {}
 
 Worker::~Worker() {
   Cancel();
@@ -59,7 +57,7 @@ void Worker::ThrowIfFailed() const {
 }
 
 void Worker::Run() {
-  pthread_setname_np(pthread_self(), name_.substr(0, 15).c_str());
+  TraceThreadName(name_);
   while (true) {
     Task task;
     std::stop_token token;

@@ -5,10 +5,10 @@
 #include <exception>
 #include <functional>
 #include <stop_token>
-#include <string>
 #include <thread>
 
 #include "dynamic_slam/base/mutex.h"
+#include "dynamic_slam/base/trace.h"
 
 namespace dynamic_slam {
 
@@ -22,7 +22,7 @@ class Worker {
   // The token says when the result is not wanted any more.
   using Task = std::function<void(const std::stop_token&)>;
 
-  explicit Worker(std::string name);
+  explicit Worker(TraceName name);
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
@@ -43,7 +43,7 @@ class Worker {
  private:
   void Run();
 
-  const std::string name_;
+  const TraceName name_;
   mutable Mutex mutex_;
   CondVar changed_;
   std::deque<Task> tasks_ DS_GUARDED_BY(mutex_);

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/features/corner_selection.h"
 #include "dynamic_slam/features/fast_detector.h"
 #include "dynamic_slam/features/smoothing.h"
@@ -146,6 +147,7 @@ OrbExtractor::OrbExtractor(const OrbOptions& options, const Camera& camera)
 OrbExtractor::~OrbExtractor() = default;
 
 void OrbExtractor::Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet* features) {
+  DS_TRACE("tracking/orb");
   impl_->Extract(grey, mask, features);
 }
 

@@ -135,9 +135,13 @@ std::vector<std::string> KnownCameras() {
   return names;
 }
 
+std::string CameraToYaml(const Camera& camera) {
+  return OptionsToYaml(
+      CameraFields{camera, camera.model == LensModel::kKannalaBrandt ? kKannalaBrandt : kPinhole});
+}
+
 void WriteCamera(const fs::path& file, const Camera& camera) {
-  const CameraFields written{camera, camera.model == LensModel::kKannalaBrandt ? kKannalaBrandt : kPinhole};
-  WriteFileAtomically(file, OptionsToYaml(written));
+  WriteFileAtomically(file, CameraToYaml(camera));
 }
 
 void CheckCameraFits(const Camera& camera, const std::string& origin, const cv::Size& image_size) {

@@ -23,6 +23,8 @@ Camera LoadCamera(const std::string& name_or_path);
 // The names that LoadCamera knows, sorted.
 std::vector<std::string> KnownCameras();
 
+// As ReadCamera reads it.
+std::string CameraToYaml(const Camera& camera);
 void WriteCamera(const std::filesystem::path& file, const Camera& camera);
 
 // Throws InputError when images of this size cannot be from that camera. origin: where the camera is from,

@@ -16,8 +16,8 @@ namespace dynamic_slam {
 // |---|---|---|
 // | ORB-SLAM2, ORB-SLAM3 | `Camera.fx` or `Camera1.fx`, `Camera.type` | PinHole, KannalaBrandt8, Rectified |
 // | OpenVSLAM, stella_vslam | `Camera.model`, flat or nested | perspective, fisheye |
-// | Kalibr's camera chain | `cam0:` with `camera_model`, `distortion_model` | pinhole with radtan,
-// equidistant or none | | EuRoC's sensor.yaml | the same without `cam0:` | the same |
+// | Kalibr's camera chain | `cam0:` with `camera_model` | pinhole with radtan, equidistant, none |
+// | EuRoC's sensor.yaml | the same without `cam0:` | the same |
 //
 // Of several cameras the first is taken: Camera1, cam0. image_size: for files that hold none, as many of
 // ORB-SLAM2; it must agree with that of a file that does. The camera is named after the file, unless that

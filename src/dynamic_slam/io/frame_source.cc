@@ -9,6 +9,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/camera_import.h"
 #include "dynamic_slam/io/image_file.h"
@@ -171,6 +172,7 @@ class VideoSource : public CheckedSource {
     if (ended_ || (end_ != 0 && index_ >= end_)) return false;
     image->timestamp_s = static_cast<double>(index_) / fps_;
     image->name = fmt::format("frame {}", index_);
+    DS_TRACE("io/decode");
     cv::Mat frame;
     if (!capture_.read(frame) || frame.empty()) {
       ended_ = true;

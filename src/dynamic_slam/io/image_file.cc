@@ -10,6 +10,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
+#include "dynamic_slam/base/trace.h"
 
 namespace dynamic_slam {
 namespace {
@@ -79,6 +80,7 @@ bool IsTruncatedImage(const std::string& bytes) {
 }
 
 cv::Mat ReadImage(const fs::path& file, std::string* reason) {
+  DS_TRACE("io/decode");
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return *reason = "the file is missing", cv::Mat();
   std::string bytes;

@@ -1,5 +1,6 @@
 #include "dynamic_slam/mapping/local_mapper.h"
 
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 
 namespace dynamic_slam {
@@ -26,6 +27,7 @@ LocalMapper::LocalMapper(const Camera& camera, const MapperOptions& options, Sha
 
 MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
                                    const std::function<bool()>& should_stop) {
+  DS_TRACE("mapping");
   if (epoch != epoch_) recent_landmarks_.clear();
   epoch_ = epoch;
   MappingResult result;
@@ -45,6 +47,7 @@ BundleSummary LocalMapper::Finish(const std::function<bool()>& should_stop) {
 }
 
 void LocalMapper::CullRecentLandmarks(KeyframeId current, Map* map, MappingResult* result) {
+  DS_TRACE("mapping/cull landmarks");
   size_t kept = 0;
   for (const LandmarkId id : recent_landmarks_) {
     const Landmark* landmark = map->landmarks().Find(id);
@@ -62,6 +65,7 @@ void LocalMapper::CullRecentLandmarks(KeyframeId current, Map* map, MappingResul
 }
 
 bool LocalMapper::CreateLandmarks(KeyframeId current, MappingResult* result) {
+  DS_TRACE("mapping/create");
   std::vector<KeyframeId> neighbours;
   bool valid = Look([&](const Map& map) { neighbours = factory_.Neighbours(map, current); });
   for (size_t i = 0; valid && i < neighbours.size(); ++i) {
@@ -77,6 +81,7 @@ bool LocalMapper::CreateLandmarks(KeyframeId current, MappingResult* result) {
 }
 
 bool LocalMapper::FuseLandmarks(KeyframeId current, MappingResult* result) {
+  DS_TRACE("mapping/fuse");
   std::vector<CovisibleKeyframe> neighbours;
   std::vector<LandmarkId> mine;
   bool valid = Look([&](const Map& map) {
@@ -100,6 +105,7 @@ bool LocalMapper::FuseLandmarks(KeyframeId current, MappingResult* result) {
 }
 
 bool LocalMapper::CullRedundantKeyframes(KeyframeId current, MappingResult* result) {
+  DS_TRACE("mapping/cull keyframes");
   std::vector<CovisibleKeyframe> neighbours;
   bool valid = Look([&](const Map& map) {
     neighbours = map.keyframes().At(current).BestCovisible(map.keyframes().size());

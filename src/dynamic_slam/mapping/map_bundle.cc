@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "dynamic_slam/base/trace.h"
+
 namespace dynamic_slam {
 namespace {
 
@@ -181,6 +183,7 @@ BundleSummary SolveAndWriteBack(const Camera& camera, const BundleOptions& optio
 
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId id, uint32_t epoch,
                           const std::function<bool()>& should_stop, SharedMap* map) {
+  DS_TRACE("mapping/adjust");
   std::optional<MapBundle> bundle;
   {
     const auto locked = map->Read();
@@ -192,6 +195,7 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
                         const std::function<bool()>& should_stop, SharedMap* map) {
+  DS_TRACE("mapping/adjust all");
   std::optional<MapBundle> bundle;
   {
     const auto locked = map->Read();

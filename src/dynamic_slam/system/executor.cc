@@ -39,7 +39,7 @@ class ThreadedExecutor : public Executor {
 
 }  // namespace
 
-const char* Name(Lane lane) {
+TraceName Name(Lane lane) {
   switch (lane) {
     case Lane::kMapping:
       return "mapping";

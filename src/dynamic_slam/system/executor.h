@@ -10,7 +10,7 @@ namespace dynamic_slam {
 enum class Lane { kMapping };
 inline constexpr Lane kLanes[] = {Lane::kMapping};
 
-const char* Name(Lane lane);
+TraceName Name(Lane lane);
 
 // Where and when the stages beside tracking run. To be called from one thread.
 //

@@ -6,6 +6,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/trace.h"
 
 namespace dynamic_slam {
 namespace {
@@ -63,6 +64,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
                     });
   }
   result.keyframes_waiting = executor_->Waiting(Lane::kMapping);
+  TraceCounter("keyframes waiting", result.keyframes_waiting);
   return result;
 }
 
@@ -83,6 +85,7 @@ void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::sto
 }
 
 BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
+  DS_TRACE("finish");
   if (is_stopped_) return {};
   executor_->Drain();
   return options_.final_bundle ? mapper_.Finish(should_stop) : BundleSummary();

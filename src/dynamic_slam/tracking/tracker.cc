@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "dynamic_slam/base/trace.h"
+
 namespace dynamic_slam {
 namespace {
 
@@ -55,6 +57,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
 
 TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask,
                               int keyframes_waiting) {
+  DS_TRACE("tracking");
   std::swap(frame_, last_);
   frame_.id = id;
   frame_.timestamp_s = timestamp_s;
