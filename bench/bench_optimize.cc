@@ -1,6 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include "dynamic_slam/optimize/bundle_adjustment.h"
+#include "dynamic_slam/optimize/bundle_solvers.h"
 #include "dynamic_slam/optimize/pose_optimizer.h"
 #include "dynamic_slam/optimize/synthetic_bundle.h"
 
@@ -26,7 +27,7 @@ void BM_PoseOptimizer(benchmark::State& state) {
 BENCHMARK(BM_PoseOptimizer)->Args({300, 0})->Args({300, 20})->Args({1000, 20})->Unit(benchmark::kMicrosecond);
 
 // A local window: 20 free and 20 fixed poses, 2500 points, about 12000 observations, 2% of them wrong.
-void BM_LocalBundle(benchmark::State& state) {
+BundleProblem LocalWindow() {
   Random random(1);
   SyntheticBundleOptions scene;
   scene.fixed_poses = 20;
@@ -39,6 +40,28 @@ void BM_LocalBundle(benchmark::State& state) {
   for (size_t i = 0; i < problem.observations.size(); i += 50) {
     problem.observations[i].ideal_px += Eigen::Vector2d(30, -20);
   }
+  return problem;
+}
+
+// One round of five steps by one solver.
+template <auto Solve>
+void BM_BundleSolver(benchmark::State& state) {
+  const BundleProblem problem = LocalWindow();
+  BundleSolverOptions options;
+  options.huber_chi2 = 5.991;
+  options.max_iterations = 5;
+  options.function_tolerance = 0;
+  const std::vector<uint8_t> skip(problem.observations.size(), 0);
+  for (auto _ : state) {
+    BundleProblem copy = problem;
+    benchmark::DoNotOptimize(Solve(SyntheticCamera(), options, {}, skip, &copy));
+  }
+}
+BENCHMARK(BM_BundleSolver<SolveDenseSchur>)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_BundleSolver<SolveSparseSchur>)->Unit(benchmark::kMillisecond);
+
+void BM_LocalBundle(benchmark::State& state) {
+  const BundleProblem problem = LocalWindow();
   BundleSummary summary;
   std::vector<uint8_t> is_outlier;
   for (auto _ : state) {
