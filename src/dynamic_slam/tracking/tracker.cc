@@ -224,15 +224,25 @@ bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
   return false;
 }
 
-// The youngest keyframes first: the camera was there a moment ago.
+// The youngest keyframes, where the camera was a moment ago, and some of the older ones, others in each
+// frame: sooner or later it comes back to one of them.
+std::vector<KeyframeId> Tracker::RelocalisationCandidates() const {
+  std::vector<KeyframeId> all;
+  map_->Read()->keyframes().ForEach([&all](const Keyframe& keyframe) { all.push_back(keyframe.id()); });
+  std::reverse(all.begin(), all.end());
+  const size_t count = std::min(all.size(), static_cast<size_t>(options_.relocalisation_keyframes));
+  const size_t young = (count + 1) / 2, older = all.size() - young;
+  std::vector<KeyframeId> candidates(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(young));
+  for (size_t i = 0; i < count - young; ++i) {
+    candidates.push_back(all[young + (static_cast<size_t>(lost_frames_) * (count - young) + i) % older]);
+  }
+  return candidates;
+}
+
 bool Tracker::Relocalise() {
-  std::vector<KeyframeId> candidates;
-  map_->Read()->keyframes().ForEach(
-      [&candidates](const Keyframe& keyframe) { candidates.push_back(keyframe.id()); });
-  const size_t count = std::min(candidates.size(), static_cast<size_t>(options_.relocalisation_keyframes));
+  const std::vector<KeyframeId> candidates = RelocalisationCandidates();
   const std::string why_lost = reason_;
-  for (size_t i = 0; i < count; ++i) {
-    const KeyframeId candidate = candidates[candidates.size() - 1 - i];
+  for (const KeyframeId candidate : candidates) {
     int inliers = 0;
     if (const auto map = map_->Read(); const Keyframe* keyframe = map->keyframes().Find(candidate)) {
       inliers = pose_tracker_.TrackFromKeyframe(*map, *keyframe, random_, &frame_);
@@ -247,9 +257,9 @@ bool Tracker::Relocalise() {
   }
   frame_.ClearLandmarks();
   inliers_ = 0;
-  reason_ =
-      fmt::format("{}; none of {} keyframes matches the image",
-                  why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost, count);
+  reason_ = fmt::format("{}; none of {} keyframes matches the image",
+                        why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost,
+                        candidates.size());
   return false;
 }
 

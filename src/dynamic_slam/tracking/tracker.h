@@ -77,6 +77,7 @@ class Tracker {
   void EmptyMap(TrackingResult* result);
   bool TrackFrame();
   bool Relocalise();
+  std::vector<KeyframeId> RelocalisationCandidates() const;
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
   Rigid3 PredictPose() const;

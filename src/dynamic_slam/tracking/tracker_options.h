@@ -91,7 +91,8 @@ struct TrackerOptions {
     visit("local_keyframes", self.local_keyframes,
           OptionField{"", 2, 1000, "Keyframes whose landmarks make the local map."});
     visit("relocalisation_keyframes", self.relocalisation_keyframes,
-          OptionField{"", 1, 1000, "Keyframes tried on each frame while lost."});
+          OptionField{"", 1, 1000,
+                      "Keyframes tried on each frame while lost: half the youngest, half others in turn."});
     visit(
         "reset_keyframes", self.reset_keyframes,
         OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
