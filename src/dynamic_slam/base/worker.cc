@@ -1,74 +1,110 @@
 #include "dynamic_slam/base/worker.h"
 
+#include <atomic>
 #include <utility>
 
 namespace dynamic_slam {
+namespace {
 
-Worker::Worker(TraceName name) : name_(name), thread_([this] { Run(); }) {}
+std::atomic<int> abandoned_count = 0;
+
+}  // namespace
+
+Worker::Worker(TraceName name, std::chrono::milliseconds patience) : name_(name), patience_(patience) {
+  Start();
+}
 
 Worker::~Worker() {
   Cancel();
   {
-    MutexLock lock(mutex_);
-    is_ending_ = true;
+    MutexLock lock(state_->mutex);
+    state_->is_ending = true;
   }
-  changed_.NotifyAll();
+  state_->changed.NotifyAll();
   thread_.join();
+}
+
+void Worker::Start() {
+  state_ = std::make_shared<State>();
+  thread_ = std::jthread([state = state_, name = name_] {
+    TraceThreadName(name);
+    Run(*state);
+  });
 }
 
 void Worker::Post(Task task) {
   {
-    MutexLock lock(mutex_);
-    if (failure_ != nullptr) std::rethrow_exception(failure_);
-    tasks_.push_back(std::move(task));
+    MutexLock lock(state_->mutex);
+    if (state_->failure != nullptr) std::rethrow_exception(state_->failure);
+    state_->tasks.push_back(std::move(task));
   }
-  changed_.NotifyAll();
+  state_->changed.NotifyAll();
 }
 
 size_t Worker::Waiting() const {
-  MutexLock lock(mutex_);
-  return tasks_.size();
+  MutexLock lock(state_->mutex);
+  return state_->tasks.size();
 }
 
 void Worker::Drain() {
-  MutexLock lock(mutex_);
-  while (is_running_ || !tasks_.empty()) changed_.Wait(mutex_);
-  if (failure_ != nullptr) std::rethrow_exception(failure_);
+  MutexLock lock(state_->mutex);
+  while (state_->is_running || !state_->tasks.empty()) state_->changed.Wait(state_->mutex);
+  if (state_->failure != nullptr) std::rethrow_exception(state_->failure);
 }
 
 void Worker::Cancel() {
   std::stop_source stop;
   {
-    MutexLock lock(mutex_);
-    tasks_.clear();
-    stop = stop_;
+    MutexLock lock(state_->mutex);
+    state_->tasks.clear();
+    stop = state_->stop;
   }
   stop.request_stop();  // not under the lock: it may call back
-  MutexLock lock(mutex_);
-  while (is_running_) changed_.Wait(mutex_);
-  tasks_.clear();
-  stop_ = std::stop_source();
-  failure_ = nullptr;
+  {
+    const bool is_patient = patience_ == kForever;
+    const auto deadline =
+        std::chrono::steady_clock::now() + (is_patient ? std::chrono::milliseconds(0) : patience_);
+    MutexLock lock(state_->mutex);
+    bool in_time = true;
+    while (state_->is_running && in_time) {
+      if (is_patient) {
+        state_->changed.Wait(state_->mutex);
+      } else {
+        in_time = state_->changed.WaitUntil(state_->mutex, deadline);
+      }
+    }
+    if (!state_->is_running) {
+      state_->tasks.clear();
+      state_->stop = std::stop_source();
+      state_->failure = nullptr;
+      return;
+    }
+    state_->is_abandoned = state_->is_ending = true;
+    ++abandoned_count;
+  }
+  thread_.detach();
+  Start();
 }
 
 void Worker::ThrowIfFailed() const {
-  MutexLock lock(mutex_);
-  if (failure_ != nullptr) std::rethrow_exception(failure_);
+  MutexLock lock(state_->mutex);
+  if (state_->failure != nullptr) std::rethrow_exception(state_->failure);
 }
 
-void Worker::Run() {
-  TraceThreadName(name_);
+int Worker::AbandonedCount() { return abandoned_count; }
+
+void Worker::Run(State& state) {
   while (true) {
     Task task;
     std::stop_token token;
     {
-      MutexLock lock(mutex_);
-      while (tasks_.empty() && !is_ending_) changed_.Wait(mutex_);
-      if (tasks_.empty()) return;
-      task = std::move(tasks_.front());
-      tasks_.pop_front();
-      token = stop_.get_token();
-      is_running_ = true;
+      MutexLock lock(state.mutex);
+      while (state.tasks.empty() && !state.is_ending) state.changed.Wait(state.mutex);
+      if (state.tasks.empty()) return;
+      task = std::move(state.tasks.front());
+      state.tasks.pop_front();
+      token = state.stop.get_token();
+      state.is_running = true;
     }
     std::exception_ptr failure;
     try {
@@ -78,14 +114,15 @@ void Worker::Run() {
     }
     task = nullptr;  // what it holds goes before anybody hears that it is done
     {
-      MutexLock lock(mutex_);
-      is_running_ = false;
+      MutexLock lock(state.mutex);
+      state.is_running = false;
+      if (state.is_abandoned) --abandoned_count;
       if (failure != nullptr) {
-        failure_ = failure;
-        tasks_.clear();
+        state.failure = failure;
+        state.tasks.clear();
       }
     }
-    changed_.NotifyAll();
+    state.changed.NotifyAll();
   }
 }
 

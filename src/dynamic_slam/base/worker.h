@@ -1,9 +1,11 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <stop_token>
 #include <thread>
 
@@ -22,7 +24,12 @@ class Worker {
   // The token says when the result is not wanted any more.
   using Task = std::function<void(const std::stop_token&)>;
 
-  explicit Worker(TraceName name);
+  static constexpr std::chrono::milliseconds kForever = std::chrono::milliseconds::max();
+
+  // patience: how long Cancel() waits for a task that does not heed the token. After that its thread is left
+  // alone with it, and a new one takes its place. Tasks of a worker without endless patience must own all
+  // that they touch.
+  explicit Worker(TraceName name, std::chrono::milliseconds patience = kForever);
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
@@ -35,22 +42,35 @@ class Worker {
   // Returns when nothing waits or runs.
   void Drain();
 
-  // Drops what waits, asks what runs to stop, and returns when it has. The worker can go on after that.
+  // Drops what waits, asks what runs to stop, and returns when it has or was abandoned. The worker can go on
+  // after that.
   void Cancel();
 
   void ThrowIfFailed() const;
 
+  // Threads left alone that have not ended since. While there are some, the program should end without
+  // destroying what they may use (std::_Exit).
+  static int AbandonedCount();
+
  private:
-  void Run();
+  // What the thread and its owner share; an abandoned thread keeps its own.
+  struct State {
+    mutable Mutex mutex;
+    CondVar changed;
+    std::deque<Task> tasks DS_GUARDED_BY(mutex);
+    bool is_running DS_GUARDED_BY(mutex) = false;
+    bool is_ending DS_GUARDED_BY(mutex) = false;
+    bool is_abandoned DS_GUARDED_BY(mutex) = false;
+    std::stop_source stop DS_GUARDED_BY(mutex);
+    std::exception_ptr failure DS_GUARDED_BY(mutex);
+  };
+
+  static void Run(State& state);
+  void Start();
 
   const TraceName name_;
-  mutable Mutex mutex_;
-  CondVar changed_;
-  std::deque<Task> tasks_ DS_GUARDED_BY(mutex_);
-  bool is_running_ DS_GUARDED_BY(mutex_) = false;
-  bool is_ending_ DS_GUARDED_BY(mutex_) = false;
-  std::stop_source stop_ DS_GUARDED_BY(mutex_);
-  std::exception_ptr failure_ DS_GUARDED_BY(mutex_);
+  const std::chrono::milliseconds patience_;
+  std::shared_ptr<State> state_;
   std::jthread thread_;
 };
 

@@ -89,6 +89,27 @@ TEST(WorkerTest, TheDestructorStopsATaskThatRuns) {
   EXPECT_TRUE(ended);
 }
 
+TEST(WorkerTest, AThreadThatDoesNotHeedIsLeftAlone) {
+  const auto may_end = std::make_shared<std::atomic<bool>>(false);
+  const auto began = std::make_shared<std::atomic<bool>>(false);
+  {
+    Worker worker("test", std::chrono::milliseconds(20));
+    worker.Post([may_end, began](const std::stop_token&) {
+      *began = true;
+      while (!*may_end) std::this_thread::yield();
+    });
+    while (!*began) std::this_thread::yield();
+    worker.Cancel();
+    EXPECT_EQ(Worker::AbandonedCount(), 1);
+    bool second = false;
+    worker.Post([&second](const std::stop_token&) { second = true; });
+    worker.Drain();
+    EXPECT_TRUE(second) << "a new thread has taken its place";
+  }
+  *may_end = true;
+  while (Worker::AbandonedCount() > 0) std::this_thread::yield();
+}
+
 TEST(BoundedQueueTest, TheOldestMakesRoom) {
   BoundedQueue<int> queue(2);
   EXPECT_EQ(queue.Push(1), std::nullopt);
