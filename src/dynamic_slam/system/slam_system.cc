@@ -39,14 +39,15 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       executor_(std::move(executor)) {}
 
 FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask) {
+  DS_TRACE("frame");
   DS_CHECK(!is_stopped_, "the system was stopped: Reset() first");
   executor_->ThrowIfFailed();
   FrameResult result;
   const auto start = std::chrono::steady_clock::now();
   preparer_.Prepare(image, &grey_);
   result.id = FrameId(frame_count_++);
-  result.tracking = tracker_.Track(result.id, timestamp_s, grey_, preparer_.MergedMask(mask),
-                                   executor_->Waiting(Lane::kMapping));
+  tracker_.Extract(result.id, timestamp_s, grey_, preparer_.MergedMask(mask));
+  result.tracking = tracker_.Track(executor_->Waiting(Lane::kMapping));
   result.tracking_ms = MillisecondsSince(start);
 
   if (result.tracking.map_was_reset) tracked_.clear();

@@ -55,9 +55,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       pose_tracker_(camera, options, octave_scales_),
       random_(seed) {}
 
-TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask,
-                              int keyframes_waiting) {
-  DS_TRACE("tracking");
+void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
   std::swap(frame_, last_);
   frame_.id = id;
   frame_.timestamp_s = timestamp_s;
@@ -68,6 +66,10 @@ TrackingResult Tracker::Track(FrameId id, double timestamp_s, const cv::Mat& gre
   frame_.grid.Build(frame_.features, bounds_);
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
+}
+
+TrackingResult Tracker::Track(int keyframes_waiting) {
+  DS_TRACE("tracking");
   inliers_ = 0;
   reason_.clear();
 
@@ -188,17 +190,25 @@ void Tracker::RefreshLastFrame() {
 }
 
 // Goes on as the camera went between the last two frames, for as long as this one took to come.
-Rigid3 Tracker::PredictPose() const {
-  if (!velocity_.has_value()) return last_.cam_from_world;
+std::optional<Rigid3> Tracker::PredictMotion() const {
+  if (!velocity_.has_value()) return std::nullopt;
   const double dt_s = frame_.timestamp_s - last_.timestamp_s;
   const double steps = velocity_dt_s_ > 0 ? std::clamp(dt_s / velocity_dt_s_, 0.0, kMaxPredictionSteps) : 1;
-  const Rigid3 motion(ExpSo3(steps * LogSo3(velocity_->rotation)), steps * velocity_->translation);
-  return motion * last_.cam_from_world;
+  return Rigid3(ExpSo3(steps * LogSo3(velocity_->rotation)), steps * velocity_->translation);
+}
+
+std::optional<Eigen::Quaterniond> Tracker::PredictedRotation() const {
+  const std::optional<Rigid3> motion = PredictMotion();
+  return motion.has_value() ? std::optional(motion->rotation) : std::nullopt;
+}
+
+std::optional<Eigen::Quaterniond> Tracker::Rotation() const {
+  return velocity_.has_value() ? std::optional(velocity_->rotation) : std::nullopt;
 }
 
 bool Tracker::TrackFrame() {
   RefreshLastFrame();
-  const Rigid3 predicted = PredictPose();
+  const Rigid3 predicted = PredictMotion().value_or(Rigid3()) * last_.cam_from_world;
   int inliers = pose_tracker_.TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
   if (inliers < options_.min_motion_inliers) {
     inliers = pose_tracker_.TrackFromFrame(last_, last_.cam_from_world,

@@ -58,10 +58,18 @@ class Tracker {
   Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
           SharedMap* map);
 
-  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden (Eq.
-  // 11). keyframes_waiting: those that local mapping has not come to yet.
-  TrackingResult Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask,
-                       int keyframes_waiting = 0);
+  // Begins a frame: takes the features out of the image, which needs neither the map nor the objects in it.
+  // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden.
+  void Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask);
+
+  // The rotation that the motion model expects since the last frame, x_in_this = R x_in_last; after Extract.
+  std::optional<Eigen::Quaterniond> PredictedRotation() const;
+
+  // Finds the pose of the frame. keyframes_waiting: those that local mapping has not come to yet.
+  TrackingResult Track(int keyframes_waiting = 0);
+
+  // The rotation that was found; none without a pose in this frame or the last.
+  std::optional<Eigen::Quaterniond> Rotation() const;
 
   // Forgets everything, and empties the map.
   void Reset();
@@ -80,7 +88,7 @@ class Tracker {
   std::vector<KeyframeId> RelocalisationCandidates() const;
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
-  Rigid3 PredictPose() const;
+  std::optional<Rigid3> PredictMotion() const;
   void CountVisibility();
   void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
   void GiveUpSmallMap(TrackingResult* result);
