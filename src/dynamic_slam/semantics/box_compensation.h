@@ -9,6 +9,7 @@
 #include "dynamic_slam/base/ids.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/semantics/detection.h"
+#include "dynamic_slam/semantics/point_motion.h"
 
 namespace dynamic_slam {
 
@@ -20,6 +21,9 @@ struct CompensationInput {
   std::optional<std::vector<Detection>> detections;
   // The camera's rotation since the frame before, x_in_this = cam_from_last * x_in_last; none when unknown.
   std::optional<Eigen::Quaterniond> cam_from_last;
+  // How points moved since the frame before, on objects and elsewhere; may be empty. It says more about an
+  // object's motion than anything else, and a late result is of little use without it.
+  std::vector<PointMotion> motions;
 };
 
 // An object that is believed to be in a frame, seen by the detector there or not.

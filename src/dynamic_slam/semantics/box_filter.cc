@@ -67,6 +67,25 @@ void BoxFilter::Predict(const BoxFilterOptions& options, double elapsed_s) {
   for (int i = 2; i < 4; ++i) axes_[i].value = std::clamp(axes_[i].value, 0.0, 10.0);
 }
 
+void BoxFilter::Follow(const BoxFilterOptions& options, double elapsed_s, const Eigen::Vector2d& shift_px,
+                       double scale) {
+  const double size = Size(axes_[2].value, axes_[3].value);
+  const std::array<Axis, 4> before = axes_;
+  Predict(options, elapsed_s);
+  const std::array<double, 4> shifts = {shift_px.x(), shift_px.y(), std::log(scale), std::log(scale)};
+  for (int i = 0; i < 4; ++i) {
+    Axis& axis = axes_[i];
+    const double variance = Square(options.motion_noise * (i < 2 ? size : 1));
+    axis.value = before[i].value + shifts[i];
+    axis.value_value = before[i].value_value + variance;
+    axis.value_rate = 0;
+    // The shift measures the rate too.
+    const double gain = axis.rate_rate / (axis.rate_rate + variance / Square(elapsed_s));
+    axis.rate += gain * (shifts[i] / elapsed_s - axis.rate);
+    axis.rate_rate *= 1 - gain;
+  }
+}
+
 void BoxFilter::Move(const Eigen::Vector2d& shift_px, const Eigen::Matrix2d& jacobian) {
   const Eigen::Vector2d rate = jacobian * Eigen::Vector2d(axes_[0].rate, axes_[1].rate);
   const double log_scale = 0.5 * std::log(std::max(std::abs(jacobian.determinant()), 1e-6));

@@ -70,7 +70,9 @@ double TrackerCompensation::Evidence(double score) const {
 void TrackerCompensation::Advance(const CompensationInput& input, TrackerState* state) {
   Predict(input, state);
   if (input.detections) {
-    for (const Detection& detection : Match(*input.detections, state)) Begin(detection, state);
+    for (const Detection& detection : Match(*input.detections, state)) {
+      if (detection.score >= options_.high_score) Begin(detection, state);
+    }
   }
   std::erase_if(state->tracks, [&](const BoxTrack& track) { return IsOver(track); });
 }
@@ -84,7 +86,12 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
     track.unseen_s += elapsed_s;
     ++track.age_frames;
     ++track.missed_frames;
-    track.filter.Predict(options_.filter, std::min(elapsed_s, kMaxStep_s));
+    const double step_s = std::min(elapsed_s, kMaxStep_s);
+    if (const auto seen = MotionOfBox(track.filter.box(), input.motions)) {  // the camera's part included
+      track.filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale);
+      continue;
+    }
+    track.filter.Predict(options_.filter, step_s);
     if (!input.cam_from_last) continue;
     const Box box = track.filter.box();
     const std::optional<ImageMotion> motion =
@@ -162,10 +169,10 @@ void TrackerCompensation::See(const Detection& detection, BoxTrack* track) const
   } else {
     vote->second += detection.score;
   }
-  track->evidence = std::min(track->evidence + Evidence(detection.score), options_.max_evidence);
-  if (detection.score >= options_.high_score || track->evidence >= options_.confirm_evidence) {
-    track->is_confirmed = true;
-  }
+  // A detection that would begin an object does not end one.
+  const double least = detection.score >= options_.high_score ? std::max(Evidence(detection.score), 0.0) : -kNever;
+  track->evidence =
+      std::clamp(track->evidence + Evidence(detection.score), least, options_.max_evidence);
   track->seen = detection;
   track->is_detected = true;
   track->unseen_s = 0;
@@ -176,8 +183,7 @@ void TrackerCompensation::Begin(const Detection& detection, TrackerState* state)
   if (state->tracks.size() >= static_cast<size_t>(options_.max_boxes)) return;
   BoxTrack track(NextTrackId(), BoxFilter(options_.filter, detection.box));
   track.class_votes.emplace_back(detection.class_id, detection.score);
-  track.evidence = std::min(Evidence(detection.score), options_.max_evidence);
-  track.is_confirmed = detection.score >= options_.high_score;
+  track.evidence = std::clamp(Evidence(detection.score), 0.0, options_.max_evidence);
   track.seen = detection;
   track.is_detected = true;
   track.age_frames = 1;
@@ -185,7 +191,8 @@ void TrackerCompensation::Begin(const Detection& detection, TrackerState* state)
 }
 
 bool TrackerCompensation::IsOver(const BoxTrack& track) const {
-  if (track.is_detected) return false;
+  const bool is_seen_well = track.is_detected && track.seen.score >= options_.high_score;
+  if (is_seen_well) return false;
   const Box box = track.filter.box();
   return track.evidence <= 0 || track.unseen_s > options_.max_unseen_s ||
          ClipToImage(box, camera_).Area() < kMinVisibleShare * box.Area();
@@ -210,7 +217,7 @@ Box TrackerCompensation::Completed(const Box& detected, const Box& predicted) co
 bool TrackerCompensation::IsHidden(const BoxTrack& track, const std::vector<BoxTrack>& tracks) const {
   const Box box = ClipToImage(track.filter.box(), camera_);
   return std::any_of(tracks.begin(), tracks.end(), [&](const BoxTrack& other) {
-    return other.is_detected && other.is_confirmed &&
+    return other.is_detected &&
            IntersectionArea(box, other.seen.box) > kHiddenShare * box.Area();
   });
 }
@@ -218,9 +225,8 @@ bool TrackerCompensation::IsHidden(const BoxTrack& track, const std::vector<BoxT
 std::vector<CompensatedBox> TrackerCompensation::BoxesOf(const TrackerState& state) const {
   std::vector<CompensatedBox> boxes;
   for (const BoxTrack& track : state.tracks) {
-    if (!track.is_confirmed) continue;
     if (!track.is_detected && IsHidden(track, state.tracks)) continue;
-    const Box box = track.is_detected ? track.seen.box : ClipToImage(track.filter.box(), camera_);
+    const Box box = ClipToImage(track.filter.box(), camera_);
     boxes.push_back({box, track.ClassId(), 1 / (1 + std::exp(-track.evidence)), track.id, track.is_detected,
                      track.age_frames, track.missed_frames});
   }

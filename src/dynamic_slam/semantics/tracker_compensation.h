@@ -12,10 +12,9 @@ namespace dynamic_slam {
 struct TrackerCompensationOptions {
   double low_score = 0.1;
   double high_score = 0.4;
-  double neutral_score = 0.25;
-  double confirm_evidence = 1.5;
+  double neutral_score = 0.45;
   double max_evidence = 6.0;
-  double miss_evidence = 0.7;
+  double miss_evidence = 1.0;
   double max_unseen_s = 1.0;
   double min_iou = 0.3;
   double max_duplicate_iou = 0.7;
@@ -27,12 +26,9 @@ struct TrackerCompensationOptions {
     visit("low_score", self.low_score,
           OptionField{"", 0, 1, "Detections with a lower score are not looked at."});
     visit("high_score", self.high_score,
-          OptionField{"", 0, 1, "A detection with this score is believed at once."});
+          OptionField{"", 0, 1, "A detection needs this score to begin an object."});
     visit("neutral_score", self.neutral_score,
           OptionField{"", 0.01, 0.99, "A detection with this score speaks neither for an object nor against."});
-    visit("confirm_evidence", self.confirm_evidence,
-          OptionField{"", 0, 20,
-                      "Log-odds at which an object is believed that was only seen with lower scores."});
     visit("max_evidence", self.max_evidence,
           OptionField{"", 0, 20, "Log-odds grow no further; over miss_evidence, the misses one outlives."});
     visit("miss_evidence", self.miss_evidence,
@@ -59,7 +55,6 @@ struct BoxTrack {
   BoxFilter filter;
   std::vector<std::pair<int, double>> class_votes;  // class id, sum of its scores
   double evidence = 0;        // log-odds of there being such an object
-  bool is_confirmed = false;  // it was believed once
   Detection seen;             // the last detection of it
   bool is_detected = false;   // in the last frame
   double unseen_s = 0;
@@ -82,7 +77,6 @@ struct TrackerState {
 // - Evidence is log-odds: a detection adds logit(score) - logit(neutral_score), a result without the object
 //   takes miss_evidence. So a box is held the longer, the longer and the better it was seen. A frame without
 //   a result says nothing against an object.
-// - An object whose detections all score low is shown when its evidence has gathered.
 class TrackerCompensation : public ReplayingCompensation<TrackerState> {
  public:
   TrackerCompensation(const TrackerCompensationOptions& options, const Camera& camera);
