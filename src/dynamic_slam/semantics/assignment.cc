@@ -17,7 +17,7 @@ std::vector<int> AssignRows(const Eigen::MatrixXd& costs) {
   // row that is being placed sits in column 0.
   std::vector<double> row_price(rows + 1, 0.0);
   std::vector<double> column_price(columns + 1, 0.0);
-  std::vector<int> row_of(columns + 1, 0);    // 0 is none
+  std::vector<int> row_of(columns + 1, 0);     // 0 is none
   std::vector<int> came_from(columns + 1, 0);  // the column before on the path
   for (int row = 1; row <= rows; ++row) {
     row_of[0] = row;

@@ -33,8 +33,11 @@ struct BoxFilterOptions {
           OptionField{"", 0, 20, "How much its velocity changes within a second, sizes per second."});
     visit("extent_rate_noise", self.extent_rate_noise,
           OptionField{"", 0, 20, "The same of the rates of its width and height, relative to them."});
-    visit("motion_noise", self.motion_noise,
-          OptionField{"", 0.001, 1, "Standard deviation of a motion between two frames that the points in the box show, in sizes."});
+    visit(
+        "motion_noise", self.motion_noise,
+        OptionField{
+            "", 0.001, 1,
+            "Standard deviation of a motion between two frames that the points in the box show, in sizes."});
     visit("velocity_memory_s", self.velocity_memory_s,
           OptionField{"s", 0.01, 100, "Time in which the velocity of an unseen box decays to a third."});
     visit("extent_memory_s", self.extent_memory_s,
@@ -53,7 +56,8 @@ class BoxFilter {
   void Predict(const BoxFilterOptions& options, double elapsed_s);
 
   // The same when the centre was seen to move by `shift_px` and the box to grow by `scale`.
-  void Follow(const BoxFilterOptions& options, double elapsed_s, const Eigen::Vector2d& shift_px, double scale);
+  void Follow(const BoxFilterOptions& options, double elapsed_s, const Eigen::Vector2d& shift_px,
+              double scale);
 
   // The image moved below the box: the centre by `shift_px`, small vectors about it by `jacobian`.
   void Move(const Eigen::Vector2d& shift_px, const Eigen::Matrix2d& jacobian);
@@ -63,7 +67,7 @@ class BoxFilter {
   // Squared distance of a detection from the prediction in sigmas, four degrees of freedom.
   double SquaredDistance(const BoxFilterOptions& options, const Box& detected) const;
 
-  Box box() const;                       // may reach out of the image
+  Box box() const;                        // may reach out of the image
   Eigen::Vector2d velocity_px_s() const;  // of the centre
 
  private:

@@ -32,7 +32,7 @@ struct PaperCompensationOptions {
 
 // A box of the list D of Algorithm 1, and what Eq. (5) needs to know of its past.
 struct PaperBox {
-  CompensatedBox box;  // its rectangle may reach out of the image
+  CompensatedBox box;                             // its rectangle may reach out of the image
   std::vector<Eigen::Vector2d> displacements_px;  // of the centre, frame to frame, the last k, oldest first
 };
 

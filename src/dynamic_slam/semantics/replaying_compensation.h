@@ -64,8 +64,8 @@ class ReplayingCompensation : public BoxCompensation {
   };
 
   size_t Find(FrameId frame) const {
-    const auto step = std::find_if(history_.begin(), history_.end(),
-                                   [&](const Step& s) { return s.input.frame == frame; });
+    const auto step =
+        std::find_if(history_.begin(), history_.end(), [&](const Step& s) { return s.input.frame == frame; });
     return static_cast<size_t>(step - history_.begin());
   }
 

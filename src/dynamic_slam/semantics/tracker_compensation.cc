@@ -5,19 +5,18 @@
 #include <limits>
 #include <optional>
 
-#include "dynamic_slam/geometry/rigid3.h"
+#include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/semantics/assignment.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr double kChi2FourDof = 9.488;       // 95% quantile
-constexpr double kOtherClassIou = 0.6;       // a detection of another class must overlap by this
-constexpr double kBorder = 0.01;             // of the image's size: a box so near to the border is cut by it
-constexpr double kMinVisibleShare = 0.25;    // of a predicted box in the image
-constexpr double kHiddenShare = 0.5;         // of a box behind another one
-constexpr double kScoreLimit = 0.95;         // no single detection is surer than this
+constexpr double kOtherClassIou = 0.6;     // a detection of another class must overlap by this
+constexpr double kBorder = 0.01;           // of the image's size: a box so near to the border is cut by it
+constexpr double kMinVisibleShare = 0.25;  // of a predicted box in the image
+constexpr double kHiddenShare = 0.5;       // of a box behind another one
+constexpr double kScoreLimit = 0.95;       // no single detection is surer than this
 constexpr double kMaxStep_s = 1.0;
 
 double Logit(double probability) { return std::log(probability / (1 - probability)); }
@@ -170,9 +169,9 @@ void TrackerCompensation::See(const Detection& detection, BoxTrack* track) const
     vote->second += detection.score;
   }
   // A detection that would begin an object does not end one.
-  const double least = detection.score >= options_.high_score ? std::max(Evidence(detection.score), 0.0) : -kNever;
-  track->evidence =
-      std::clamp(track->evidence + Evidence(detection.score), least, options_.max_evidence);
+  const double least =
+      detection.score >= options_.high_score ? std::max(Evidence(detection.score), 0.0) : -kNever;
+  track->evidence = std::clamp(track->evidence + Evidence(detection.score), least, options_.max_evidence);
   track->seen = detection;
   track->is_detected = true;
   track->unseen_s = 0;
@@ -217,8 +216,7 @@ Box TrackerCompensation::Completed(const Box& detected, const Box& predicted) co
 bool TrackerCompensation::IsHidden(const BoxTrack& track, const std::vector<BoxTrack>& tracks) const {
   const Box box = ClipToImage(track.filter.box(), camera_);
   return std::any_of(tracks.begin(), tracks.end(), [&](const BoxTrack& other) {
-    return other.is_detected &&
-           IntersectionArea(box, other.seen.box) > kHiddenShare * box.Area();
+    return other.is_detected && IntersectionArea(box, other.seen.box) > kHiddenShare * box.Area();
   });
 }
 

@@ -27,8 +27,9 @@ struct TrackerCompensationOptions {
           OptionField{"", 0, 1, "Detections with a lower score are not looked at."});
     visit("high_score", self.high_score,
           OptionField{"", 0, 1, "A detection needs this score to begin an object."});
-    visit("neutral_score", self.neutral_score,
-          OptionField{"", 0.01, 0.99, "A detection with this score speaks neither for an object nor against."});
+    visit(
+        "neutral_score", self.neutral_score,
+        OptionField{"", 0.01, 0.99, "A detection with this score speaks neither for an object nor against."});
     visit("max_evidence", self.max_evidence,
           OptionField{"", 0, 20, "Log-odds grow no further; over miss_evidence, the misses one outlives."});
     visit("miss_evidence", self.miss_evidence,
@@ -54,9 +55,9 @@ struct BoxTrack {
   int id;
   BoxFilter filter;
   std::vector<std::pair<int, double>> class_votes;  // class id, sum of its scores
-  double evidence = 0;        // log-odds of there being such an object
-  Detection seen;             // the last detection of it
-  bool is_detected = false;   // in the last frame
+  double evidence = 0;                              // log-odds of there being such an object
+  Detection seen;                                   // the last detection of it
+  bool is_detected = false;                         // in the last frame
   double unseen_s = 0;
   int age_frames = 0, missed_frames = 0;
 
