@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "dynamic_slam/semantics/detection.h"
+
+namespace dynamic_slam {
+
+// Where a point of the image before is in this one, px.
+struct PointMotion {
+  Eigen::Vector2d from_px, to_px;
+};
+
+// How a box moved: its centre by shift_px, its sides by the factor `scale`.
+struct BoxMotion {
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
+  double scale = 1;
+};
+
+// The motion of the object that fills most of the box, from the points in its middle: medians, which bear
+// that almost half of them belong to something else. Nothing when there are too few points.
+std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> motions);
+
+}  // namespace dynamic_slam

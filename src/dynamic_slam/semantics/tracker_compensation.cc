@@ -1,0 +1,234 @@
+#include "dynamic_slam/semantics/tracker_compensation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "dynamic_slam/geometry/chi2.h"
+#include "dynamic_slam/semantics/assignment.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kOtherClassIou = 0.6;     // a detection of another class must overlap by this
+constexpr double kBorder = 0.01;           // of the image's size: a box so near to the border is cut by it
+constexpr double kMinVisibleShare = 0.25;  // of a predicted box in the image
+constexpr double kHiddenShare = 0.5;       // of a box behind another one
+constexpr double kScoreLimit = 0.95;       // no single detection is surer than this
+constexpr double kMaxStep_s = 1.0;
+
+double Logit(double probability) { return std::log(probability / (1 - probability)); }
+
+// How the neighbourhood of a pixel moves when the camera turns.
+struct ImageMotion {
+  Eigen::Vector2d shift_px;
+  Eigen::Matrix2d jacobian;
+};
+
+// Nothing when the pixel turns out of view.
+std::optional<ImageMotion> RotateImage(const Camera& camera, const Eigen::Quaterniond& cam_from_last,
+                                       const Eigen::Vector2d& at_px) {
+  // The lens model holds inside the image only: what is outside moves as its nearest pixel inside.
+  const Eigen::Vector2d from = at_px.cwiseMax(0).cwiseMin(Eigen::Vector2d(camera.width, camera.height));
+  Eigen::Matrix<double, 2, 3> moved;
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Vector2d pixel = from;
+    if (i > 0) pixel[i - 1] += 1;
+    const Eigen::Vector3d ray = cam_from_last * camera.Unproject(camera.Undistort(pixel)).normalized();
+    if (ray.z() < 0.1) return std::nullopt;
+    moved.col(i) = camera.Distort(camera.Project(ray));
+  }
+  ImageMotion motion{moved.col(0) - from, {}};
+  motion.jacobian << moved.col(1) - moved.col(0), moved.col(2) - moved.col(0);
+  if (!motion.shift_px.allFinite() || !motion.jacobian.allFinite()) return std::nullopt;
+  return motion;
+}
+
+}  // namespace
+
+int BoxTrack::ClassId() const {
+  return std::max_element(class_votes.begin(), class_votes.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+TrackerCompensation::TrackerCompensation(const TrackerCompensationOptions& options, const Camera& camera)
+    : options_(options), camera_(camera) {}
+
+std::vector<Detection> TrackerCompensation::Usable(std::span<const Detection> detections) const {
+  return UsableDetections(detections, camera_, options_.low_score, options_.max_boxes,
+                          options_.max_duplicate_iou);
+}
+
+double TrackerCompensation::Evidence(double score) const {
+  return Logit(std::clamp(score, 1 - kScoreLimit, kScoreLimit)) - Logit(options_.neutral_score);
+}
+
+void TrackerCompensation::Advance(const CompensationInput& input, TrackerState* state) {
+  Predict(input, state);
+  if (input.detections) {
+    for (const Detection& detection : Match(*input.detections, state)) {
+      if (detection.score >= options_.high_score) Begin(detection, state);
+    }
+  }
+  std::erase_if(state->tracks, [&](const BoxTrack& track) { return IsOver(track); });
+}
+
+void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* state) const {
+  double elapsed_s = input.timestamp_s - state->timestamp_s;
+  if (!(elapsed_s > 0)) elapsed_s = 1 / (camera_.fps > 0 ? camera_.fps : 30);
+  state->timestamp_s = input.timestamp_s;
+  for (BoxTrack& track : state->tracks) {
+    track.is_detected = false;
+    track.unseen_s += elapsed_s;
+    ++track.age_frames;
+    ++track.missed_frames;
+    const double step_s = std::min(elapsed_s, kMaxStep_s);
+    if (const auto seen = MotionOfBox(track.filter.box(), input.motions)) {  // the camera's part included
+      track.filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale);
+      continue;
+    }
+    track.filter.Predict(options_.filter, step_s);
+    if (!input.cam_from_last) continue;
+    const Box box = track.filter.box();
+    const std::optional<ImageMotion> motion =
+        RotateImage(camera_, *input.cam_from_last, {box.CenterX(), box.CenterY()});
+    if (motion) {
+      track.filter.Move(motion->shift_px, motion->jacobian);
+    } else {
+      track.unseen_s = kNever;
+    }
+  }
+}
+
+double TrackerCompensation::Cost(const BoxTrack& track, const Detection& detection, bool same_class) const {
+  if ((track.ClassId() == detection.class_id) != same_class) return kNever;
+  const Box predicted = track.filter.box();
+  const double iou = IoU(ClipToImage(predicted, camera_), detection.box);
+  if (!same_class) return iou >= kOtherClassIou ? 1 - iou : kNever;
+  // Distance decides between boxes that the prediction does not reach.
+  const double distance =
+      track.filter.SquaredDistance(options_.filter, Completed(detection.box, predicted)) / kChi2FourDof;
+  if (iou < options_.min_iou && distance > 1) return kNever;
+  return 1 - iou + 0.1 * std::min(distance, 1.0);
+}
+
+std::vector<Detection> TrackerCompensation::Match(const std::vector<Detection>& detections,
+                                                  TrackerState* state) const {
+  std::vector<BoxTrack>& tracks = state->tracks;
+  std::vector<bool> is_used(detections.size(), false);
+  // One round: the tracks still unseen against the unused detections that qualify.
+  const auto assign = [&](auto qualifies, bool same_class) {
+    std::vector<size_t> rows, columns;
+    for (size_t t = 0; t < tracks.size(); ++t) {
+      if (!tracks[t].is_detected) rows.push_back(t);
+    }
+    for (size_t d = 0; d < detections.size(); ++d) {
+      if (!is_used[d] && qualifies(detections[d])) columns.push_back(d);
+    }
+    Eigen::MatrixXd costs(rows.size(), columns.size());
+    for (size_t r = 0; r < rows.size(); ++r) {
+      for (size_t c = 0; c < columns.size(); ++c) {
+        costs(r, c) = Cost(tracks[rows[r]], detections[columns[c]], same_class);
+      }
+    }
+    const std::vector<int> column_of = CheapestPairs(costs);
+    for (size_t r = 0; r < rows.size(); ++r) {
+      if (column_of[r] < 0) continue;
+      const size_t d = columns[column_of[r]];
+      is_used[d] = true;
+      See(detections[d], &tracks[rows[r]]);
+    }
+  };
+  const auto is_high = [&](const Detection& d) { return d.score >= options_.high_score; };
+  assign(is_high, true);
+  assign([&](const Detection& d) { return !is_high(d); }, true);
+  assign(is_high, false);
+
+  for (BoxTrack& track : tracks) {
+    // What stands behind something else cannot be seen, which says nothing against it.
+    if (!track.is_detected && !IsHidden(track, tracks)) track.evidence -= options_.miss_evidence;
+  }
+  std::vector<Detection> left;
+  for (size_t d = 0; d < detections.size(); ++d) {
+    if (!is_used[d]) left.push_back(detections[d]);
+  }
+  return left;
+}
+
+void TrackerCompensation::See(const Detection& detection, BoxTrack* track) const {
+  const Box measured = Completed(detection.box, track->filter.box());
+  track->filter.Update(options_.filter, measured);
+  const auto vote = std::find_if(track->class_votes.begin(), track->class_votes.end(),
+                                 [&](const auto& v) { return v.first == detection.class_id; });
+  if (vote == track->class_votes.end()) {
+    track->class_votes.emplace_back(detection.class_id, detection.score);
+  } else {
+    vote->second += detection.score;
+  }
+  // A detection that would begin an object does not end one.
+  const double least =
+      detection.score >= options_.high_score ? std::max(Evidence(detection.score), 0.0) : -kNever;
+  track->evidence = std::clamp(track->evidence + Evidence(detection.score), least, options_.max_evidence);
+  track->seen = detection;
+  track->is_detected = true;
+  track->unseen_s = 0;
+  track->missed_frames = 0;
+}
+
+void TrackerCompensation::Begin(const Detection& detection, TrackerState* state) {
+  if (state->tracks.size() >= static_cast<size_t>(options_.max_boxes)) return;
+  BoxTrack track(NextTrackId(), BoxFilter(options_.filter, detection.box));
+  track.class_votes.emplace_back(detection.class_id, detection.score);
+  track.evidence = std::clamp(Evidence(detection.score), 0.0, options_.max_evidence);
+  track.seen = detection;
+  track.is_detected = true;
+  track.age_frames = 1;
+  state->tracks.push_back(std::move(track));
+}
+
+bool TrackerCompensation::IsOver(const BoxTrack& track) const {
+  const bool is_seen_well = track.is_detected && track.seen.score >= options_.high_score;
+  if (is_seen_well) return false;
+  const Box box = track.filter.box();
+  return track.evidence <= 0 || track.unseen_s > options_.max_unseen_s ||
+         ClipToImage(box, camera_).Area() < kMinVisibleShare * box.Area();
+}
+
+Box TrackerCompensation::Completed(const Box& detected, const Box& predicted) const {
+  double left = detected.x, right = detected.x + detected.width;
+  double top = detected.y, bottom = detected.y + detected.height;
+  // At most as much again outside as there is inside.
+  const double border_x = kBorder * camera_.width, border_y = kBorder * camera_.height;
+  if (left < border_x) left = std::clamp(predicted.x, left - detected.width, left);
+  if (top < border_y) top = std::clamp(predicted.y, top - detected.height, top);
+  if (right > camera_.width - border_x) {
+    right = std::clamp(predicted.x + predicted.width, right, right + detected.width);
+  }
+  if (bottom > camera_.height - border_y) {
+    bottom = std::clamp(predicted.y + predicted.height, bottom, bottom + detected.height);
+  }
+  return {left, top, right - left, bottom - top};
+}
+
+bool TrackerCompensation::IsHidden(const BoxTrack& track, const std::vector<BoxTrack>& tracks) const {
+  const Box box = ClipToImage(track.filter.box(), camera_);
+  return std::any_of(tracks.begin(), tracks.end(), [&](const BoxTrack& other) {
+    return other.is_detected && IntersectionArea(box, other.seen.box) > kHiddenShare * box.Area();
+  });
+}
+
+std::vector<CompensatedBox> TrackerCompensation::BoxesOf(const TrackerState& state) const {
+  std::vector<CompensatedBox> boxes;
+  for (const BoxTrack& track : state.tracks) {
+    if (!track.is_detected && IsHidden(track, state.tracks)) continue;
+    const Box box = ClipToImage(track.filter.box(), camera_);
+    boxes.push_back({box, track.ClassId(), 1 / (1 + std::exp(-track.evidence)), track.id, track.is_detected,
+                     track.age_frames, track.missed_frames});
+  }
+  return boxes;
+}
+
+}  // namespace dynamic_slam
