@@ -63,7 +63,7 @@ class Tracker {
   TrackingResult Track(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask,
                        int keyframes_waiting = 0);
 
-  // Forgets everything, and empties the map.
+  // Forgets everything, and empties the map: the same images give the same poses again.
   void Reset();
 
   // The frame of the last Track(); its pose holds when the state is kTracking.
@@ -93,6 +93,7 @@ class Tracker {
   Initializer initializer_;
   PoseTracker pose_tracker_;
   LocalViewBuilder view_builder_;
+  uint64_t seed_;
   Random random_;
 
   TrackingState state_ = TrackingState::kInitialising;
