@@ -1,5 +1,6 @@
 #include "run_console.h"
 
+#include <atomic>
 #include <csignal>
 
 #include <fmt/core.h>
@@ -10,11 +11,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-volatile std::sig_atomic_t interrupted = 0;
+// Any thread may be the one that takes the signal.
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "a handler must not wait");
 
 // A second one ends the program at once.
 void OnInterrupt(int signal) {
-  interrupted = 1;
+  interrupted = true;
   std::signal(signal, SIG_DFL);
 }
 
@@ -26,7 +29,7 @@ double SecondsSince(Clock::time_point start) {
 
 RunConsole::RunConsole(bool quiet)
     : quiet_(quiet), overwrite_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_line_(start_) {
-  interrupted = 0;
+  interrupted = false;
   std::signal(SIGINT, OnInterrupt);
   std::signal(SIGTERM, OnInterrupt);
 }
@@ -36,7 +39,7 @@ RunConsole::~RunConsole() {
   std::signal(SIGTERM, SIG_DFL);
 }
 
-bool RunConsole::ShouldStop() const { return interrupted != 0; }
+bool RunConsole::ShouldStop() const { return interrupted; }
 
 void RunConsole::Show(const RunProgress& progress) {
   if (quiet_) return;

@@ -197,23 +197,51 @@ class CliRunTest(unittest.TestCase):
         self.assertEqual(summary["lost_count"], 0)
         self.assertGreater(summary["frames_tracked"], 80)
 
-    def test_interrupt_keeps_the_results(self):
-        out = os.path.join(self.folder, "a")
-        trace = os.path.join(self.folder, "trace.json")
-        process = subprocess.Popen([PROGRAM, "run", self.room, "--out", out, "--trace", trace],
+    def interrupt(self, signal_number, source, *arguments):
+        """Sends the signal when the first line of progress tells that the run has begun; (stdout, folder, summary)."""
+        out = tempfile.mkdtemp(dir=self.folder)
+        process = subprocess.Popen([PROGRAM, "run", source, "--out", out, *arguments],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        # The first line of progress tells that the run has begun.
         self.assertIn("frame", process.stderr.readline())
-        process.send_signal(signal.SIGINT)
-        stdout, _ = process.communicate(timeout=120)
-        self.assertEqual(process.returncode, 130)
+        process.send_signal(signal_number)
+        stdout, stderr = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 130, stderr)
         self.assertIn("interrupted", stdout)
+        self.assertLessEqual(set(RESULTS) - {"trajectory.png"}, set(os.listdir(out)))  # drawn where there is truth
         summary = json.loads(read(out, "summary.json"))
         self.assertTrue(summary["interrupted"])
-        self.assertLess(summary["frames_total"], FRAMES)
-        self.assertIn("tracking", [event["name"] for event in json.loads(read(trace))["traceEvents"]])
+        self.assertEqual(summary["failure"], "")
         self.assertEqual(len(data_lines(out, "trajectory.txt")),
                          summary["frames_tracked"] + summary["frames_backfilled"])
+        self.assertEqual(summary["keyframes"], len(data_lines(out, "keyframes.txt")))
+        return stdout, out, summary
+
+    def test_interrupt_keeps_the_results(self):
+        trace = os.path.join(self.folder, "trace.json")
+        for mode in ("offline", "realtime"):
+            for signal_number in (signal.SIGINT, signal.SIGTERM):
+                with self.subTest(mode=mode, signal=signal_number):
+                    _, _, summary = self.interrupt(signal_number, self.room, "--mode", mode, "--trace", trace)
+                    self.assertEqual(summary["mode"], mode)
+                    self.assertLess(summary["frames_total"], FRAMES)
+                    self.assertGreater(summary["keyframes"], 0)
+                    events = json.loads(read(trace))["traceEvents"]
+                    self.assertIn("tracking", [event["name"] for event in events])
+
+    def test_interrupt_before_there_is_a_map(self):
+        # A camera that stands still never has one. The first line comes after five seconds.
+        still = os.path.join(self.folder, "still")
+        os.mkdir(still)
+        shutil.copy(os.path.join(self.room, "camera.yaml"), still)
+        name = data_lines(self.room, "rgb.txt")[0].split()[1]
+        shutil.copytree(os.path.join(self.room, "rgb"), os.path.join(still, "rgb"))
+        self.write("still/rgb.txt", "".join(f"{i / 30:.6f} {name}\n" for i in range(3000)))
+        stdout, _, summary = self.interrupt(signal.SIGINT, still, "--mode", "realtime")
+        self.assertIn("no map was made: initialising", stdout)
+        self.assertIsNone(summary["initialised_at"])
+        self.assertEqual((summary["keyframes"], summary["frames_tracked"]), (0, 0))
+        self.assertGreater(summary["frames_total"], 0)
+        self.assertLess(summary["frames_total"], 3000)
 
     def test_trace_has_all_stages(self):
         trace_file = os.path.join(self.folder, "new", "trace.json")

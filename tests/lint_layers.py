@@ -4,6 +4,7 @@
 - A member of src/dynamic_slam includes only members of lower layers (the table in docs/architecture.md) and itself.
 - No iteration over an unordered container, and no ordered container keyed by pointers: both follow addresses or hashes,
   and runs would differ.
+- Threads are made in base/worker only, so that all of them are stopped and joined and their failures heard of.
 - No file of src or apps is longer than 500 lines. Headers have #pragma once and no `using namespace`.
 """
 
@@ -16,6 +17,9 @@ MAX_LINES = 500
 INCLUDE = re.compile(r'^\s*#\s*include\s*"dynamic_slam/([a-z_0-9]+)/')
 TABLE_ROW = re.compile(r"^\|\s*(L\d+)?\s*\|\s*`([a-z_0-9]+)`\s*\|")
 UNORDERED = re.compile(r"\bunordered_(?:multi)?(?:map|set)\s*<")
+THREAD = re.compile(r"\bstd::(?:jthread|thread|async)\b(?!::)|\bpthread_create\b")
+THREAD_MAKERS = ["src/dynamic_slam/base/worker.h", "src/dynamic_slam/base/worker.cc",
+                 "src/dynamic_slam/base/trace_test.cc"]  # a worker always has a name; traces know threads without
 POINTER_KEY = re.compile(r"\bstd::(?:multi)?(?:map|set)\s*<\s*(?:const\s+)?[\w:]+\s*(?:const\s*)?\*")
 
 
@@ -50,6 +54,13 @@ def unordered_names(code):
         if name:
             names.add(name.group(1))
     return names
+
+
+def check_threads(code):
+    """Yields (line number, problem)."""
+    for number, line in enumerate(code.splitlines(), 1):
+        if THREAD.search(line):
+            yield number, "a thread outside of base/worker: use a Worker"
 
 
 def check_file(path, code, names, layers, member):
@@ -91,6 +102,11 @@ def check_tree(root):
     for member in sorted(layers):
         if member not in members and not (root / member).is_dir():
             problems.append(f"docs/architecture.md: the member '{member}' does not exist")
+    for folder in ("tests", "tools"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix in (".h", ".cc"):
+                found = check_threads(without_comments(path.read_text()))
+                problems += [f"{path.relative_to(root)}:{n}: {p}" for n, p in found]
     for folder in ("src", "apps", "bench"):
         for path in sorted((root / folder).rglob("*")):
             if path.suffix not in (".h", ".cc"):
@@ -105,7 +121,10 @@ def check_tree(root):
                 member = relative.parts[2] if relative.parts[2] in layers else None
             else:
                 member = folder if folder in layers else None
-            problems += [f"{relative}:{n}: {p}" for n, p in check_file(path, code, names, layers, member)]
+            found = list(check_file(path, code, names, layers, member))
+            if str(relative) not in THREAD_MAKERS:
+                found += check_threads(code)
+            problems += [f"{relative}:{n}: {p}" for n, p in found]
     return problems
 
 
@@ -115,6 +134,8 @@ def self_test():
         "docs/architecture.md": "| layer | member | what |\n|---|---|---|\n| L0 | `base` | x |\n| L1 | `low` | x |\n"
                                 "|    | `beside` | x |\n| L2 | `high` | x |\n",
         "src/dynamic_slam/base/a.h": "#pragma once\n",
+        "src/dynamic_slam/base/worker.h": "#pragma once\nstd::jthread thread_;\n",
+        "tests/clean.cc": "// std::thread\nstd::this_thread::yield();\n",
         "src/dynamic_slam/low/a.h": '#pragma once\n#include "dynamic_slam/base/a.h"\n#include "dynamic_slam/low/b.h"\n',
         "src/dynamic_slam/low/b.h": "#pragma once\nstd::unordered_map<int, std::vector<int>> table_;\n",
         "src/dynamic_slam/low/b.cc": "// for (auto x : table_)\nif (table_.find(3) == table_.end()) {}\n"
@@ -134,6 +155,10 @@ def self_test():
         ({"src/dynamic_slam/low/b.cc": "auto it = table_.begin();\n"}, "unordered container 'table_'"),
         ({"src/dynamic_slam/low/c.cc": "std::map<const Node*, int> order;\n"}, "ordered by addresses"),
         ({"src/dynamic_slam/low/c.cc": "x\n" * (MAX_LINES + 1)}, "split the file"),
+        ({"src/dynamic_slam/low/c.cc": "std::thread t(run);\n"}, "low/c.cc:1: a thread outside of base/worker"),
+        ({"src/dynamic_slam/low/worker.h": "#pragma once\nstd::jthread t;\n"}, "low/worker.h:2: a thread"),
+        ({"apps/c.cc": "auto x = std::async(run);\n"}, "apps/c.cc:1: a thread"),
+        ({"tests/c.cc": "pthread_create(&t, nullptr, run, nullptr);\n"}, "tests/c.cc:1: a thread"),
         ({"src/dynamic_slam/low/c.h": "int x;\n"}, "#pragma once"),
         ({"src/dynamic_slam/low/c.h": "#pragma once\nusing namespace std;\n"}, "c.h:2: no `using namespace`"),
     ]

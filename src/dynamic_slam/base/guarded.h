@@ -21,13 +21,31 @@ class DS_CAPABILITY("shared mutex") SharedMutex {
   std::shared_mutex mutex_;
 };
 
+namespace internal {
+
+inline thread_local bool this_thread_has_handle = false;
+
+inline void EnterGuarded() {
+  DS_CHECK(!this_thread_has_handle, "a second handle in one thread");
+  SchedulePoint();
+  this_thread_has_handle = true;
+}
+
+inline void LeaveGuarded() {
+  this_thread_has_handle = false;
+  SchedulePoint();
+}
+
+}  // namespace internal
+
 // A value that several threads share and that nobody reaches without its lock:
 //
 //   auto map = shared_map.Read();  // or Write()
 //   map->keyframes()...            // locked until `map` goes out of scope
 //
-// Keep handles for a moment only, and no pointer into the value longer than its handle. A thread that takes a
-// second handle of the same value while it holds one would wait for itself: that is checked (InternalError).
+// Keep handles for a moment only, and no pointer into the value longer than its handle. A thread has one
+// handle at a time: with a second one of the same value it would wait for itself, with one of another value
+// two threads could wait for each other. That is checked (InternalError).
 template <class T>
 class Guarded {
  public:
@@ -37,7 +55,7 @@ class Guarded {
    public:
     ~ReadHandle() DS_NO_THREAD_SAFETY_ANALYSIS {
       guarded_.mutex_.UnlockShared();
-      guarded_.Leave();
+      internal::LeaveGuarded();
     }
     ReadHandle(const ReadHandle&) = delete;
     ReadHandle& operator=(const ReadHandle&) = delete;
@@ -47,7 +65,7 @@ class Guarded {
    private:
     friend class Guarded;
     explicit ReadHandle(const Guarded& guarded) DS_NO_THREAD_SAFETY_ANALYSIS : guarded_(guarded) {
-      guarded_.Enter();
+      internal::EnterGuarded();
       guarded_.mutex_.LockShared();
     }
     const Guarded& guarded_;
@@ -57,7 +75,7 @@ class Guarded {
    public:
     ~WriteHandle() DS_NO_THREAD_SAFETY_ANALYSIS {
       guarded_.mutex_.Unlock();
-      guarded_.Leave();
+      internal::LeaveGuarded();
     }
     WriteHandle(const WriteHandle&) = delete;
     WriteHandle& operator=(const WriteHandle&) = delete;
@@ -68,7 +86,7 @@ class Guarded {
    private:
     friend class Guarded;
     explicit WriteHandle(Guarded& guarded) DS_NO_THREAD_SAFETY_ANALYSIS : guarded_(guarded) {
-      guarded_.Enter();
+      internal::EnterGuarded();
       guarded_.mutex_.Lock();
     }
     Guarded& guarded_;
@@ -83,18 +101,6 @@ class Guarded {
   [[nodiscard]] WriteHandle Write() { return WriteHandle(*this); }
 
  private:
-  void Enter() const {
-    DS_CHECK(this_thread_holds_ != this, "second handle of one value");
-    SchedulePoint();
-    this_thread_holds_ = this;
-  }
-  void Leave() const {
-    this_thread_holds_ = nullptr;
-    SchedulePoint();
-  }
-
-  static inline thread_local const Guarded* this_thread_holds_ = nullptr;
-
   mutable SharedMutex mutex_;
   T value_ DS_GUARDED_BY(mutex_);
 };

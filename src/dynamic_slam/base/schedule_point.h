@@ -9,7 +9,7 @@ class Scheduler {
   virtual void OnSchedulePoint() = 0;
 };
 
-// Of the calling thread; not owned. Only tests set it (system/shuffled_executor.h).
+// Of the calling thread; not owned. Only tests set it (tests/shuffled_executor.h).
 inline thread_local Scheduler* this_thread_scheduler = nullptr;
 
 // A place where another thread may come first: before a shared value is locked, and after it is released.

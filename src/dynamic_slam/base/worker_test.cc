@@ -134,10 +134,16 @@ TEST(BoundedQueueTest, PopWaitsForAValueAndForTheEnd) {
 }
 
 TEST(GuardedTest, ASecondHandleInOneThreadIsABugThatIsNamed) {
-  Guarded<int> a(1), b(2);
-  const auto first = a.Read();
-  EXPECT_THROW(a.Write(), InternalError);
-  EXPECT_EQ(*b.Read(), 2) << "another value";
+  Guarded<int> a(1);
+  Guarded<double> b(2);
+  {
+    const auto first = a.Read();
+    EXPECT_THROW(a.Write(), InternalError);
+    EXPECT_THROW(a.Read(), InternalError);
+    EXPECT_THROW(b.Read(), InternalError) << "another value";
+  }
+  EXPECT_EQ(*a.Write(), 1) << "one after the other";
+  EXPECT_EQ(*b.Read(), 2);
 }
 
 TEST(GuardedTest, WritesOfTwoThreadsAddUp) {

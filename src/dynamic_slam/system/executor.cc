@@ -1,17 +1,31 @@
 #include "dynamic_slam/system/executor.h"
 
 #include <array>
+#include <exception>
 
 namespace dynamic_slam {
 namespace {
 
 class InlineExecutor : public Executor {
  public:
-  void Post(Lane, Task task) override { task(std::stop_token()); }
+  void Post(Lane, Task task) override {
+    ThrowIfFailed();
+    try {
+      task(std::stop_token());
+    } catch (...) {
+      failure_ = std::current_exception();
+      throw;
+    }
+  }
   int Waiting(Lane) const override { return 0; }
-  void Drain() override {}
-  void Cancel() override {}
-  void ThrowIfFailed() const override {}
+  void Drain() override { ThrowIfFailed(); }
+  void Cancel() override { failure_ = nullptr; }
+  void ThrowIfFailed() const override {
+    if (failure_ != nullptr) std::rethrow_exception(failure_);
+  }
+
+ private:
+  std::exception_ptr failure_;
 };
 
 class ThreadedExecutor : public Executor {

@@ -14,7 +14,8 @@ TraceName Name(Lane lane);
 
 // Where and when the stages beside tracking run. To be called from one thread.
 //
-// What a task throws reaches the caller by the next call of Post, Drain or ThrowIfFailed.
+// What a task throws reaches the caller by the same or the next call of Post, and by each one of Drain and
+// ThrowIfFailed until Cancel().
 class Executor {
  public:
   using Task = Worker::Task;

@@ -85,9 +85,13 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
 
   const size_t announced = source.FrameCount();
   FrameLog log(&summary);
+  std::unique_ptr<FrameFeed> feed;
+  const auto end_feed = [&summary, &feed] {
+    if (feed != nullptr) summary.frames_dropped = feed->DroppedCount();
+    feed.reset();  // and its thread: the source is ours again
+  };
   try {
-    const std::unique_ptr<FrameFeed> feed =
-        summary.mode == RunMode::kRealtime ? MakeRealtimeFeed(&source) : MakeDirectFeed(&source);
+    feed = summary.mode == RunMode::kRealtime ? MakeRealtimeFeed(&source) : MakeDirectFeed(&source);
     while (true) {
       summary.interrupted = should_stop();
       if (summary.interrupted) break;
@@ -104,12 +108,13 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
       log.Add(image->timestamp_s, result);
       if (control.on_frame) control.on_frame({summary.frames.size(), announced, &result, &system.map()});
     }
-    summary.frames_dropped = feed->DroppedCount();
+    end_feed();
     if (summary.interrupted) system.Stop();
     summary.final_bundle = system.Finish(should_stop);
     summary.interrupted |= summary.final_bundle.stopped;
-  } catch (const std::exception&) {
+  } catch (...) {
     summary.failure = std::current_exception();
+    end_feed();
     system.Stop();
   }
 

@@ -38,6 +38,9 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       mapper_(camera(), options.mapper, &map_),
       executor_(std::move(executor)) {}
 
+// Tasks ask the executor what waits, so none may run any more when it goes.
+SlamSystem::~SlamSystem() { executor_->Cancel(); }
+
 FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask) {
   DS_TRACE("frame");
   DS_CHECK(!is_stopped_, "the system was stopped: Reset() first");

@@ -53,6 +53,7 @@ class SlamSystem {
   // The stages beside tracking run where the executor puts them.
   SlamSystem(const Camera& raw_camera, const SystemOptions& options, RunMode mode,
              std::unique_ptr<Executor> executor);
+  ~SlamSystem();
 
   // image: of the raw camera's size, any type that ImagePreparer takes. mask: empty, or CV_8UC1 of camera()'s
   // size, not 0 where keypoints are forbidden, beside those of the static mask. Throws InputError, and

@@ -53,6 +53,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       extractor_(orb, camera),
       initializer_(camera, options.initializer, octave_scales_),
       pose_tracker_(camera, options, octave_scales_),
+      seed_(seed),
       random_(seed) {}
 
 void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
@@ -174,6 +175,7 @@ void Tracker::Reset() {
   TrackingResult ignored;
   EmptyMap(&ignored);
   initializer_.Reset();
+  random_ = Random(seed_);
 }
 
 // Local mapping may have moved, merged or erased what the last frame saw, and added to it.

@@ -71,7 +71,7 @@ class Tracker {
   // The rotation that was found; none without a pose in this frame or the last.
   std::optional<Eigen::Quaterniond> Rotation() const;
 
-  // Forgets everything, and empties the map.
+  // Forgets everything, and empties the map: the same images give the same poses again.
   void Reset();
 
   // The frame of the last Track(); its pose holds when the state is kTracking.
@@ -102,6 +102,7 @@ class Tracker {
   Initializer initializer_;
   PoseTracker pose_tracker_;
   LocalViewBuilder view_builder_;
+  uint64_t seed_;
   Random random_;
 
   TrackingState state_ = TrackingState::kInitialising;

@@ -1,0 +1,249 @@
+// Interleavings of the stages, drawn by seed: what is wrong between two looks at the map comes out here.
+
+#include <cstring>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/mapping/local_mapper.h"
+#include "dynamic_slam/system/slam_system.h"
+#include "dynamic_slam/tracking/tracker.h"
+#include "shuffled_executor.h"
+#include "small_room.h"
+#include "whole_run.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::IsEmpty;
+
+constexpr uint64_t kSeeds = 200;
+constexpr uint64_t kShards = 8;
+
+// What happens in the middle of a run.
+enum class Event { kNone, kReset, kLoss, kStop };
+
+SystemOptions RunOptions() {
+  SystemOptions options = SmallRoom::CheapOptions();
+  // Every loss ends the map, also of a map that mapping is busy with.
+  options.tracker.reset_keyframes = 1000;
+  options.tracker.reset_after_frames = 2;
+  return options;
+}
+
+template <class T>
+void AppendBytes(const T& value, std::string* bytes) {
+  bytes->append(reinterpret_cast<const char*>(&value), sizeof(value));
+}
+
+void AppendBytes(const Trajectory& trajectory, std::string* bytes) {
+  for (const StampedPose& pose : trajectory) {
+    AppendBytes(pose.timestamp_s, bytes);
+    for (const double x : pose.world_from_cam.translation) AppendBytes(x, bytes);
+    for (const double x : pose.world_from_cam.rotation.coeffs()) AppendBytes(x, bytes);
+  }
+}
+
+// All that a run has made, bit by bit.
+std::string Bytes(const SlamSystem& system) {
+  std::string bytes;
+  AppendBytes(system.FrameTrajectory(), &bytes);
+  AppendBytes(system.KeyframeTrajectory(), &bytes);
+  system.map().Read()->landmarks().ForEach([&bytes](const Landmark& landmark) {
+    AppendBytes(landmark.id().value(), &bytes);
+    for (const double x : landmark.position()) AppendBytes(x, &bytes);
+    for (const Observation& observation : landmark.observations()) {
+      AppendBytes(observation.keyframe.value(), &bytes);
+      AppendBytes(observation.keypoint, &bytes);
+    }
+  });
+  return bytes;
+}
+
+struct ShuffledRun {
+  std::vector<std::string> problems;  // of the map
+  Trajectory trajectory, truth;
+  MappingReport mapping;
+  size_t expected = 0;  // frames of the last map, if it begins with the film
+  std::string bytes;
+  std::vector<int> decisions;
+};
+
+ShuffledRun RunShuffled(uint64_t seed, Event event) {
+  const SmallRoom& room = SmallRoom::Get();
+  auto executor = std::make_unique<ShuffledExecutor>(seed);
+  const ShuffledExecutor& shuffled = *executor;
+  SlamSystem system(SmallRoom::SmallCamera(), RunOptions(), RunMode::kRealtime, std::move(executor));
+  Random random(seed);
+  ShuffledRun run;
+  const auto process = [&](const cv::Mat& image, const Rigid3& world_from_cam) {
+    run.truth.push_back({static_cast<double>(run.truth.size()) / 10, world_from_cam});
+    system.Process(run.truth.back().timestamp_s, image);
+  };
+  const auto play = [&](size_t frames) {
+    for (size_t i = 0; i < frames; ++i) process(room.images[i], room.room.truth()[i].world_from_cam);
+    run.expected = frames;
+  };
+  // The map is made by the first of these, and mapping is busy with it.
+  const size_t when = 7 + random.Index(9);
+  play(event == Event::kNone ? room.images.size() : when);
+  if (event == Event::kLoss) {
+    for (int i = 0; i < 3; ++i) process(SmallRoom::BlackImage(), Rigid3());
+  }
+  if (event == Event::kReset) system.Reset();
+  if (event == Event::kLoss || event == Event::kReset) play(20);
+  if (event == Event::kStop) {
+    system.Stop();
+    EXPECT_THROW(system.Process(99, room.images[0]), InternalError);
+  }
+  system.Finish();
+  run.problems = system.map().Read()->Validate();
+  run.trajectory = system.FrameTrajectory();
+  run.mapping = system.mapping_report();
+  run.bytes = Bytes(system);
+  run.decisions = shuffled.Decisions();
+  return run;
+}
+
+class ShuffledTest : public ::testing::TestWithParam<uint64_t> {};
+
+TEST_P(ShuffledTest, EveryOrderOfTheStagesGivesAValidMapAndTheRightPath) {
+  const Trajectory& truth = SmallRoom::Get().room.truth();
+  int abandoned = 0, stopped = 0;
+  for (uint64_t seed = GetParam(); seed < kSeeds; seed += kShards) {
+    const Event event = static_cast<Event>((seed / kShards) % 4);
+    SCOPED_TRACE(fmt::format("seed {} event {}", seed, static_cast<int>(event)));
+    ShuffledRun run;
+    ASSERT_NO_THROW(run = RunShuffled(seed, event));
+    EXPECT_THAT(run.problems, IsEmpty());
+    for (const StampedPose& pose : run.trajectory) ASSERT_TRUE(pose.world_from_cam.IsFinite());
+    EXPECT_GE(run.trajectory.size(), 0.8 * static_cast<double>(run.expected));
+    EXPECT_LE(run.trajectory.size(), run.expected);
+    EXPECT_LE(ApeRmse(run.truth, run.trajectory), 0.04 * PathLength(ToPoseList(truth)));
+    abandoned += run.mapping.keyframes_abandoned;
+    stopped += run.mapping.bundles_stopped;
+  }
+  EXPECT_GT(abandoned, 0) << "no map was given up while mapping was busy with it";
+  EXPECT_GT(stopped, 0) << "no bundle adjustment was interrupted";
+}
+
+INSTANTIATE_TEST_SUITE_P(Shards, ShuffledTest, ::testing::Range<uint64_t>(0, kShards));
+
+TEST(ShuffledExecutorTest, TheSameSeedGivesTheSameBytes) {
+  for (const Event event : {Event::kNone, Event::kLoss}) {
+    const ShuffledRun first = RunShuffled(7, event), second = RunShuffled(7, event);
+    EXPECT_GT(first.bytes.size(), 1000u);
+    EXPECT_TRUE(first.bytes == second.bytes);
+    EXPECT_EQ(first.decisions, second.decisions);
+  }
+}
+
+TEST(ShuffledExecutorTest, OtherSeedsGiveOtherOrders) {
+  std::set<std::vector<int>> decisions;
+  std::set<std::string> results;
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    const ShuffledRun run = RunShuffled(seed, Event::kNone);
+    EXPECT_THAT(run.decisions, testing::AllOf(testing::Contains(0), testing::Contains(1)));
+    decisions.insert(run.decisions);
+    results.insert(run.bytes);
+  }
+  EXPECT_EQ(decisions.size(), 5u);
+  EXPECT_GT(results.size(), 1u) << "the order matters to the result, or nothing was shuffled";
+}
+
+TEST(ShuffledExecutorTest, KeepsTheContractOfExecutors) {
+  ShuffledExecutor executor(1);
+  std::vector<int> done;
+  for (int i = 0; i < 3; ++i) {
+    executor.Post(Lane::kMapping, [&done, i](const std::stop_token&) { done.push_back(i); });
+  }
+  executor.Drain();
+  EXPECT_THAT(done, testing::ElementsAre(0, 1, 2));
+
+  executor.Post(Lane::kMapping, [](const std::stop_token& token) {
+    while (!token.stop_requested()) SchedulePoint();
+  });
+  executor.Post(Lane::kMapping, [&done](const std::stop_token&) { done.push_back(3); });
+  executor.Cancel();
+  EXPECT_EQ(executor.Waiting(Lane::kMapping), 0);
+  EXPECT_EQ(done.size(), 3u);
+
+  const auto fail = [](const std::stop_token&) { throw std::runtime_error("disk full"); };
+  executor.Post(Lane::kMapping, fail);
+  EXPECT_THROW(executor.Drain(), std::runtime_error);
+  EXPECT_THROW(executor.Post(Lane::kMapping, fail), std::runtime_error);
+  executor.Cancel();
+  EXPECT_NO_THROW(executor.Drain());
+}
+
+// Whether `trial(seed)` shows the bug for one of the seeds; the first one.
+template <class Trial>
+std::optional<uint64_t> FirstSeedThatFinds(Trial&& trial) {
+  for (uint64_t seed = 0; seed < kSeeds; ++seed) {
+    if (trial(seed)) return seed;
+  }
+  return std::nullopt;
+}
+
+// Planted: a count is read with one handle and written with the next, so that what the other thread adds in
+// between is lost. Every access is locked: ThreadSanitizer has nothing to say.
+TEST(PlantedTest, ALostUpdateIsFound) {
+  const auto loses_one = [](uint64_t seed, bool planted) {
+    Guarded<int> count(0);
+    const auto add = [&count, planted] {
+      if (planted) {
+        const int old = *count.Read();
+        *count.Write() = old + 1;
+      } else {
+        ++*count.Write();
+      }
+    };
+    ShuffledExecutor executor(seed);
+    executor.Post(Lane::kMapping, [&add](const std::stop_token&) { add(); });
+    add();
+    executor.Drain();
+    return *count.Read() != 2;
+  };
+  EXPECT_TRUE(FirstSeedThatFinds([&](uint64_t seed) { return loses_one(seed, true); }).has_value());
+  EXPECT_FALSE(FirstSeedThatFinds([&](uint64_t seed) { return loses_one(seed, false); }).has_value());
+}
+
+// Planted in the whole SLAM: the mapping task asks for the map's epoch when it begins, not when the keyframe
+// was made. When tracking gives the map up in between, the keyframe's id means nothing any more, or another
+// keyframe.
+TEST(PlantedTest, AnEpochThatIsReadTooLateIsFound) {
+  const SmallRoom& room = SmallRoom::Get();
+  const SystemOptions options = RunOptions();
+  const auto goes_wrong = [&](uint64_t seed, bool planted) {
+    SharedMap map(OctaveScales(options.orb));
+    const Camera camera = SmallRoom::SmallCamera();
+    Tracker tracker(camera, options.orb, options.tracker, options.seed, &map);
+    LocalMapper mapper(camera, options.mapper, &map);
+    ShuffledExecutor executor(seed);
+    try {
+      for (int i = 0; i < 16; ++i) {
+        const TrackingResult result = tracker.Track(FrameId(static_cast<uint32_t>(i)), room.Stamp(i),
+                                                    i < 12 ? room.image(i) : SmallRoom::BlackImage(), {},
+                                                    executor.Waiting(Lane::kMapping));
+        for (const KeyframeId keyframe : result.new_keyframes) {
+          executor.Post(Lane::kMapping,
+                        [&, planted, keyframe, epoch = result.map_epoch](const std::stop_token&) {
+                          mapper.Process(keyframe, planted ? map.Read()->epoch() : epoch);
+                        });
+        }
+      }
+      executor.Drain();
+    } catch (const InternalError&) {
+      return true;
+    }
+    return !map.Read()->Validate().empty();
+  };
+  EXPECT_TRUE(FirstSeedThatFinds([&](uint64_t seed) { return goes_wrong(seed, true); }).has_value());
+  for (uint64_t seed = 0; seed < 10; ++seed) EXPECT_FALSE(goes_wrong(seed, false)) << seed;
+}
+
+}  // namespace
+}  // namespace dynamic_slam
