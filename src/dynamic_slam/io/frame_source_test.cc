@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "dynamic_slam/base/test_folder.h"
 #include "dynamic_slam/io/source_layout.h"
-#include "dynamic_slam/io/test_folder.h"
 
 namespace dynamic_slam {
 namespace {
