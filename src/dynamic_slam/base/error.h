@@ -1,10 +1,10 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <stdexcept>
 #include <string>
 #include <utility>
-
-#include <fmt/format.h>
 
 namespace dynamic_slam {
 
@@ -33,9 +33,9 @@ namespace internal {
 }  // namespace dynamic_slam
 
 // DS_CHECK(a < b, "a={} b={}", a, b): throws InternalError with the values when the condition is false.
-#define DS_CHECK(condition, ...)                                                                \
-  do {                                                                                          \
-    if (!(condition)) [[unlikely]]                                                              \
-      ::dynamic_slam::internal::CheckFailed(__FILE__, __LINE__, #condition,                     \
-                                            std::string(__VA_OPT__(fmt::format(__VA_ARGS__)))); \
+#define DS_CHECK(condition, ...)                                                                         \
+  do {                                                                                                   \
+    if (!(condition)) [[unlikely]]                                                                       \
+      ::dynamic_slam::internal::CheckFailed(__FILE__, __LINE__, #condition,                              \
+                                            std::string(__VA_OPT__(fmt::format(__VA_ARGS__))));          \
   } while (false)

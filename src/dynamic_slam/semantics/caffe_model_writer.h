@@ -37,7 +37,7 @@ class CaffeModelWriter {
  private:
   static std::string Varint(uint64_t value) {
     std::string bytes;
-    for (; value >= 0x80; value >>= 7) bytes += static_cast<char>(value & 0x7f | 0x80);
+    for (; value >= 0x80; value >>= 7) bytes += static_cast<char>((value & 0x7f) | 0x80);
     return bytes + static_cast<char>(value);
   }
   static std::string Field(uint64_t number, const std::string& bytes) {

@@ -184,7 +184,8 @@ TEST(DecoderTest, OtherShapesAreRefusedOrEmpty) {
     for (int round = 0; round < 500; ++round) {
       const int columns = static_cast<int>(random.Index(10));
       std::vector<int> shape(random.Index(3), 1 + static_cast<int>(random.Index(2)));
-      shape.insert(shape.end(), {static_cast<int>(random.Index(60)), columns});
+      shape.push_back(static_cast<int>(random.Index(60)));
+      shape.push_back(columns);
       const int types[] = {CV_32F, CV_32F, CV_32F, CV_64F, CV_8U, CV_32S, CV_32FC2};
       const cv::Mat output(shape, types[random.Index(7)], cv::Scalar::all(0.5));
       const bool is_right_width = output.type() == CV_32F && columns == decoder.columns;
