@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -113,7 +114,9 @@ void RunDetect(const DetectArguments& arguments) {
   for (const std::string& warning : detector->warnings()) fmt::print(stderr, "warning: {}\n", warning);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   CheckCanBeWritten(arguments.out);
+  if (!arguments.images.empty()) CheckCanBeWritten(std::filesystem::path(arguments.images) / "000000.jpg");
   const DetectRun run = DetectAll(arguments, *source, *detector);
+  // Compensation and the comparison with the truth belong here, over run.boxes.
   WriteBoxFile(arguments.out, run.boxes);
   fmt::print("{}: {} boxes in {} images\n", arguments.out, run.boxes.size(), run.times_ms.size());
   for (const SourceProblem& problem : source->Problems())
