@@ -15,8 +15,8 @@ namespace dynamic_slam {
 // camera is validated. Throws InputError with file:line for each problem.
 Camera ReadCamera(const std::filesystem::path& file);
 
-// `name_or_path` is a camera file, or the name of one of config/cameras (base/config_files.h). An InputError for
-// an unknown name lists the known ones.
+// `name_or_path` is a camera file, or the name of one of config/cameras (base/config_files.h). An InputError
+// for an unknown name lists the known ones.
 Camera LoadCamera(const std::string& name_or_path);
 
 // The names that LoadCamera knows, sorted.

@@ -126,6 +126,14 @@ TEST_F(FrameSourceTest, SkipsAndRemembersBadFrames) {
                           "rgb.txt:11: 'what is this' is not 'timestamp file'"));
 }
 
+TEST_F(FrameSourceTest, ImagesOfAnySizeWhereTheyAreWanted) {
+  WriteImage("a.png", Image(1));
+  WriteImage("b.png", Image(2, {65, 48}));
+  WriteImage("c.png", Image(3));
+  EXPECT_THAT(Levels(OpenFrameSource(folder_).get()), ElementsAre(1, 3));
+  EXPECT_THAT(Levels(OpenFrameSource(folder_, {.any_size = true}).get()), ElementsAre(1, 2, 3));
+}
+
 TEST_F(FrameSourceTest, AStampThatIsNoTimeCostsOneFrame) {
   WriteTum(8);
   Write(
