@@ -6,7 +6,9 @@
 
 #include "cmd_config.h"
 #include "cmd_demo.h"
+#include "cmd_detect.h"
 #include "cmd_eval.h"
+#include "cmd_models.h"
 #include "cmd_run.h"
 #include "cmd_simulate.h"
 #include "dynamic_slam/base/error.h"
@@ -27,6 +29,8 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   dynamic_slam::AddRunCommand(app, &exit_code);
   dynamic_slam::AddEvalCommand(app);
+  dynamic_slam::AddDetectCommand(app);
+  dynamic_slam::AddModelsCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);
   dynamic_slam::AddConfigCommand(app);

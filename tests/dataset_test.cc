@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "dynamic_slam/base/test_folder.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/camera_file.h"
-#include "dynamic_slam/io/test_folder.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "whole_run.h"
 

@@ -12,8 +12,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dynamic_slam/base/random.h"
+#include "dynamic_slam/base/test_folder.h"
 #include "dynamic_slam/base/text.h"
-#include "dynamic_slam/io/test_folder.h"
 #include "whole_run.h"
 
 namespace dynamic_slam {

@@ -5,7 +5,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
-#include "dynamic_slam/io/test_folder.h"
+#include "dynamic_slam/base/test_folder.h"
 
 namespace dynamic_slam {
 namespace {

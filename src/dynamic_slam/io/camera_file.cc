@@ -1,10 +1,8 @@
 #include "dynamic_slam/io/camera_file.h"
 
-#include <algorithm>
-#include <cstdlib>
-#include <limits>
 #include <span>
 
+#include "dynamic_slam/base/config_files.h"
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/base/text.h"
@@ -58,19 +56,6 @@ constexpr std::string_view kRequiredKeys[] = {"width", "height", "fx", "fy", "cx
 constexpr std::string_view kRequiredFisheyeKeys[] = {"width", "height", "fx", "fy", "cx",
                                                      "cy",    "k1",     "k2", "k3", "k4"};
 
-// Where camera files are looked for, best first.
-std::vector<fs::path> CameraFolders() {
-  std::vector<fs::path> folders;
-  if (const char* config = std::getenv("DYNAMIC_SLAM_CONFIG"); config != nullptr && *config != '\0') {
-    folders.push_back(fs::path(config) / "cameras");
-  }
-  folders.push_back(fs::path(DYNAMIC_SLAM_SOURCE_CONFIG) / "cameras");
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) folders.push_back(program.parent_path().parent_path() / "share/dynamic_slam/config/cameras");
-  return folders;
-}
-
 }  // namespace
 
 Camera ReadCamera(const fs::path& file) {
@@ -105,35 +90,10 @@ Camera ReadCamera(const fs::path& file) {
 }
 
 Camera LoadCamera(const std::string& name_or_path) {
-  const fs::path path(name_or_path);
-  std::error_code ignored;
-  if (fs::is_regular_file(path, ignored)) return ReadCamera(path);
-  const bool is_name = !path.has_parent_path() && path.extension() != ".yaml" && path.extension() != ".yml";
-  if (is_name && !name_or_path.empty()) {
-    for (const fs::path& folder : CameraFolders()) {
-      const fs::path file = folder / (name_or_path + ".yaml");
-      if (fs::is_regular_file(file, ignored)) return ReadCamera(file);
-    }
-  }
-  const std::vector<std::string> known = KnownCameras();
-  throw InputError(
-      fmt::format("camera '{}'", name_or_path),
-      is_name ? "is neither a file nor a known name" : "there is no such file",
-      fmt::format("Known names: {}.{}", fmt::join(known, ", "), DidYouMean(name_or_path, known)));
+  return ReadCamera(FindConfig("cameras", "camera", name_or_path));
 }
 
-std::vector<std::string> KnownCameras() {
-  std::vector<std::string> names;
-  for (const fs::path& folder : CameraFolders()) {
-    std::error_code ignored;
-    for (const auto& item : fs::directory_iterator(folder, ignored)) {
-      if (item.path().extension() == ".yaml") names.push_back(item.path().stem().string());
-    }
-  }
-  std::sort(names.begin(), names.end());
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  return names;
-}
+std::vector<std::string> KnownCameras() { return ConfigNames("cameras"); }
 
 std::string CameraToYaml(const Camera& camera) {
   return OptionsToYaml(

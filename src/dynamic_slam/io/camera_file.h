@@ -15,8 +15,7 @@ namespace dynamic_slam {
 // camera is validated. Throws InputError with file:line for each problem.
 Camera ReadCamera(const std::filesystem::path& file);
 
-// `name_or_path` is a camera file, or the name of one: NAME.yaml in the first of
-// $DYNAMIC_SLAM_CONFIG/cameras, the config/cameras of the source tree and of the installation. An InputError
+// `name_or_path` is a camera file, or the name of one of config/cameras (base/config_files.h). An InputError
 // for an unknown name lists the known ones.
 Camera LoadCamera(const std::string& name_or_path);
 

@@ -25,7 +25,7 @@ constexpr double kDefaultFps = 30;
 // What all sources do alike: keep the first image, check size and stamp of each.
 class CheckedSource : public FrameSource {
  public:
-  explicit CheckedSource(std::string layout) : layout_(std::move(layout)) {}
+  CheckedSource(std::string layout, bool any_size) : layout_(std::move(layout)), any_size_(any_size) {}
 
   std::optional<SourceImage> Next() final {
     if (first_) return std::exchange(first_, std::nullopt);
@@ -69,7 +69,7 @@ class CheckedSource : public FrameSource {
       return fmt::format("its stamp {:.6f} is a duplicate", image.timestamp_s);
     }
     if (size_.empty()) size_ = image.image.size();
-    if (image.image.size() != size_) {
+    if (!any_size_ && image.image.size() != size_) {
       return fmt::format("its size is {} x {} px, that of the first image {} x {} px", image.image.cols,
                          image.image.rows, size_.width, size_.height);
     }
@@ -77,6 +77,7 @@ class CheckedSource : public FrameSource {
   }
 
   std::string layout_;
+  bool any_size_;
   cv::Size size_;
   std::optional<SourceImage> first_;
   std::optional<double> last_stamp_s_;
@@ -87,7 +88,9 @@ class CheckedSource : public FrameSource {
 class ListedSource : public CheckedSource {
  public:
   ListedSource(const fs::path& path, SourceListing listing, const FrameSourceOptions& options)
-      : CheckedSource(listing.layout), listing_(std::move(listing)), all_(listing_.entries) {
+      : CheckedSource(listing.layout, options.any_size),
+        listing_(std::move(listing)),
+        all_(listing_.entries) {
     const size_t start = static_cast<size_t>(options.start);
     if (start >= all_.size()) {
       throw InputError(path.string(),
@@ -142,7 +145,8 @@ class ListedSource : public CheckedSource {
 
 class VideoSource : public CheckedSource {
  public:
-  VideoSource(const fs::path& path, const FrameSourceOptions& options) : CheckedSource("video") {
+  VideoSource(const fs::path& path, const FrameSourceOptions& options)
+      : CheckedSource("video", options.any_size) {
     if (!OpenQuietly(path.string())) {
       throw InputError(
           path.string(), "is not a video that can be read",

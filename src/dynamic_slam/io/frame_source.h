@@ -52,9 +52,10 @@ class FrameSource {
 };
 
 struct FrameSourceOptions {
-  double fps = 0;      // of a folder of images (0: 30) and of a video (0: what the file says)
-  int start = 0;       // frames skipped at the beginning, without decoding them
-  int max_frames = 0;  // frames tried after that; 0: all
+  double fps = 0;         // of a folder of images (0: 30) and of a video (0: what the file says)
+  int start = 0;          // frames skipped at the beginning, without decoding them
+  int max_frames = 0;     // frames tried after that; 0: all
+  bool any_size = false;  // images of another size than the first are not skipped
 };
 
 // Opens a folder in TUM RGB-D (rgb.txt), KITTI odometry (image_0, times.txt) or EuRoC layout (mav0, or the

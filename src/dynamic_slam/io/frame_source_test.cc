@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "dynamic_slam/base/test_folder.h"
 #include "dynamic_slam/io/source_layout.h"
-#include "dynamic_slam/io/test_folder.h"
 
 namespace dynamic_slam {
 namespace {
@@ -124,6 +124,14 @@ TEST_F(FrameSourceTest, SkipsAndRemembersBadFrames) {
                           "rgb/empty.png: the file is empty", "rgb/text.png: the image cannot be decoded",
                           "rgb/big.png: its size is 65 x 48 px, that of the first image 64 x 48 px",
                           "rgb.txt:11: 'what is this' is not 'timestamp file'"));
+}
+
+TEST_F(FrameSourceTest, ImagesOfAnySizeWhereTheyAreWanted) {
+  WriteImage("a.png", Image(1));
+  WriteImage("b.png", Image(2, {65, 48}));
+  WriteImage("c.png", Image(3));
+  EXPECT_THAT(Levels(OpenFrameSource(folder_).get()), ElementsAre(1, 3));
+  EXPECT_THAT(Levels(OpenFrameSource(folder_, {.any_size = true}).get()), ElementsAre(1, 2, 3));
 }
 
 TEST_F(FrameSourceTest, AStampThatIsNoTimeCostsOneFrame) {

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "dynamic_slam/io/test_folder.h"
+#include "dynamic_slam/base/test_folder.h"
 
 namespace dynamic_slam {
 namespace {

@@ -20,18 +20,20 @@ namespace {
 constexpr int kMinSizePx = 16;  // as Camera::Validate
 
 struct BayerPattern {
-  const char* name;  // colours of pixels (0, 0), (1, 0), (0, 1), (1, 1)
-  int to_grey;       // OpenCV names a pattern by the pixels (1, 1) and (2, 1)
+  const char* name;        // colours of pixels (0, 0), (1, 0), (0, 1), (1, 1)
+  int to_grey, to_colour;  // OpenCV names a pattern by the pixels (1, 1) and (2, 1)
 };
-constexpr std::array<BayerPattern, 4> kBayerPatterns = {{{"rggb", cv::COLOR_BayerBG2GRAY},
-                                                         {"bggr", cv::COLOR_BayerRG2GRAY},
-                                                         {"grbg", cv::COLOR_BayerGB2GRAY},
-                                                         {"gbrg", cv::COLOR_BayerGR2GRAY}}};
+constexpr std::array<BayerPattern, 4> kBayerPatterns = {
+    {{"rggb", cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR},
+     {"bggr", cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR},
+     {"grbg", cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR},
+     {"gbrg", cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR}}};
+constexpr BayerPattern kNoBayer = {"none", -1, -1};
 
-// The conversion for an image that begins at `corner` of a sensor with that pattern: an odd number of columns
-// or rows cut off shifts the pattern. -1 for "none".
-int BayerToGrey(std::string pattern, const cv::Point& corner) {
-  if (pattern == "none") return -1;
+// The pattern of an image that begins at `corner` of a sensor with the named one: an odd number of columns or
+// rows cut off shifts it.
+BayerPattern BayerAt(std::string pattern, const cv::Point& corner) {
+  if (pattern == "none") return kNoBayer;
   const auto is = [&pattern](const BayerPattern& candidate) { return pattern == candidate.name; };
   if (std::none_of(kBayerPatterns.begin(), kBayerPatterns.end(), is)) {
     const std::vector<std::string> names = {"none", "rggb", "bggr", "grbg", "gbrg"};
@@ -47,7 +49,7 @@ int BayerToGrey(std::string pattern, const cv::Point& corner) {
     std::swap(pattern[0], pattern[2]);
     std::swap(pattern[1], pattern[3]);
   }
-  return std::find_if(kBayerPatterns.begin(), kBayerPatterns.end(), is)->to_grey;
+  return *std::find_if(kBayerPatterns.begin(), kBayerPatterns.end(), is);
 }
 
 cv::Rect CropOf(const Camera& raw, const ImageOptions& options) {
@@ -117,8 +119,10 @@ ImagePreparer::ImagePreparer(const Camera& raw_camera, const ImageOptions& optio
     : options_(options),
       raw_size_(raw_camera.width, raw_camera.height),
       crop_(CropOf(Validated(raw_camera, options), options)),
-      camera_(PreparedCamera(raw_camera, crop_, options.resize_width)),
-      bayer_to_grey_(BayerToGrey(options.bayer, crop_.tl())) {
+      camera_(PreparedCamera(raw_camera, crop_, options.resize_width)) {
+  const BayerPattern bayer = BayerAt(options.bayer, crop_.tl());
+  bayer_to_grey_ = bayer.to_grey;
+  bayer_to_colour_ = bayer.to_colour;
   camera_.Validate();
   if (!options.mask.empty()) mask_ = ReadMask(options.mask);
 }
@@ -175,31 +179,40 @@ std::string ImagePreparer::Refusal(const cv::Mat& raw) const {
   return "";
 }
 
-void ImagePreparer::Prepare(const cv::Mat& raw, cv::Mat* grey) {
+void ImagePreparer::Prepare(const cv::Mat& raw, cv::Mat* grey) { Convert(raw, 1, grey); }
+
+void ImagePreparer::PrepareColour(const cv::Mat& raw, cv::Mat* colour) { Convert(raw, 3, colour); }
+
+void ImagePreparer::Convert(const cv::Mat& raw, int channels, cv::Mat* prepared) {
   if (const std::string refusal = Refusal(raw); !refusal.empty()) {
     throw InputError("image", refusal, "Check the camera and the options image.* against the images.");
   }
   cv::Mat image = raw(crop_);
   const auto convert = [this, &image](int code) {
-    cv::cvtColor(image, grey_, code);
-    image = grey_;
+    cv::cvtColor(image, converted_, code);
+    image = converted_;
   };
-  if (bayer_to_grey_ >= 0) convert(bayer_to_grey_);
-  if (image.channels() == 3) convert(cv::COLOR_BGR2GRAY);
-  if (image.channels() == 4) convert(cv::COLOR_BGRA2GRAY);
+  const bool is_grey = channels == 1;
+  if (bayer_to_grey_ >= 0) {
+    convert(is_grey ? bayer_to_grey_ : bayer_to_colour_);
+  } else if (image.channels() == 4) {
+    convert(is_grey ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGRA2BGR);
+  } else if (image.channels() != channels) {
+    convert(is_grey ? cv::COLOR_BGR2GRAY : cv::COLOR_GRAY2BGR);
+  }
 
   const cv::Size size(camera_.width, camera_.height);
   const double white = options_.white_level > 0  ? options_.white_level
                        : image.depth() == CV_16U ? std::numeric_limits<uint16_t>::max()
                                                  : std::numeric_limits<uint8_t>::max();
   if (image.size() == size) {
-    image.convertTo(*grey, CV_8U, 255 / white);  // a plain copy of 8 bits
+    image.convertTo(*prepared, CV_8U, 255 / white);  // a plain copy of 8 bits
   } else {
     if (image.depth() != CV_8U || white != 255) {
       image.convertTo(eight_bits_, CV_8U, 255 / white);
       image = eight_bits_;
     }
-    Resize(image, size, grey);
+    Resize(image, size, prepared);
   }
 }
 

@@ -9,7 +9,8 @@
 
 namespace dynamic_slam {
 
-// Makes of a camera's raw images the grey ones that the SLAM works on, and of its calibration theirs.
+// Makes of a camera's raw images the grey ones that the SLAM works on, the coloured ones that detectors see,
+// and of its calibration theirs.
 class ImagePreparer {
  public:
   // raw_camera: of the raw images. Throws InputError that names the option when the options do not fit each
@@ -30,10 +31,14 @@ class ImagePreparer {
   // it has that size already. Throws InputError with the Refusal.
   void Prepare(const cv::Mat& raw, cv::Mat* grey);
 
+  // The same image in colour, CV_8UC3 (BGR), also of a grey one.
+  void PrepareColour(const cv::Mat& raw, cv::Mat* colour);
+
   // mask() together with `mask`, which is empty or like it. Valid until the next call.
   cv::Mat MergedMask(const cv::Mat& mask);
 
  private:
+  void Convert(const cv::Mat& raw, int channels, cv::Mat* prepared);
   cv::Mat ReadMask(const std::string& file) const;
 
   ImageOptions options_;
@@ -41,8 +46,9 @@ class ImagePreparer {
   cv::Rect crop_;  // of the raw image
   Camera camera_;
   cv::Mat mask_;
-  int bayer_to_grey_ = -1;     // OpenCV's conversion code for the cropped image; -1: no Bayer pattern
-  cv::Mat grey_, eight_bits_;  // intermediate images
+  int bayer_to_grey_ = -1;  // OpenCV's conversion code for the cropped image; -1: no Bayer pattern
+  int bayer_to_colour_ = -1;
+  cv::Mat converted_, eight_bits_;  // intermediate images
   cv::Mat merged_mask_;
 };
 

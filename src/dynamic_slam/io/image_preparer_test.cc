@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "dynamic_slam/io/test_folder.h"
+#include "dynamic_slam/base/test_folder.h"
 
 namespace dynamic_slam {
 namespace {
@@ -88,6 +88,30 @@ TEST_F(ImagePreparerTest, ColoursBecomeLuma) {
   EXPECT_LE(LargestDifference(Prepared({}, cv::Mat(48, 64, CV_8UC4, cv::Scalar(10, 100, 200, 7))), luma), 1);
   const cv::Scalar deep(10 * 257, 100 * 257, 200 * 257);
   EXPECT_LE(LargestDifference(Prepared({}, cv::Mat(48, 64, CV_16UC3, deep)), luma), 1);
+}
+
+// Detectors see the same part of the image in the same size, in colour.
+TEST_F(ImagePreparerTest, ColourImagesKeepTheirColours) {
+  ImageOptions options;
+  options.crop_left = 8;
+  options.resize_width = 28;
+  const cv::Scalar colour(10, 100, 200);
+  const auto prepared = [&options](const cv::Mat& raw) {
+    cv::Mat image;
+    ImagePreparer(RawCamera(), options).PrepareColour(raw, &image);
+    EXPECT_EQ(image.type(), CV_8UC3);
+    EXPECT_EQ(image.size(), cv::Size(28, 24));
+    return image;
+  };
+  const auto difference = [](const cv::Mat& image, const cv::Scalar& wanted) {
+    return cv::norm(image, cv::Mat(image.size(), CV_8UC3, wanted), cv::NORM_INF);
+  };
+  EXPECT_LE(difference(prepared(cv::Mat(48, 64, CV_8UC3, colour)), colour), 1);
+  EXPECT_LE(difference(prepared(cv::Mat(48, 64, CV_8UC4, colour)), colour), 1);
+  EXPECT_LE(difference(prepared(cv::Mat(48, 64, CV_16UC3, colour * 257)), colour), 1);
+  EXPECT_LE(difference(prepared(cv::Mat(48, 64, CV_8UC1, cv::Scalar(77))), cv::Scalar::all(77)), 1);
+  options.bayer = "grbg";
+  EXPECT_LE(difference(prepared(Mosaic<uint8_t>("grbg", {200, 100, 10})), colour), 1);
 }
 
 TEST_F(ImagePreparerTest, WhiteLevelIsWhite) {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "dynamic_slam/base/random.h"
-#include "dynamic_slam/io/test_folder.h"
+#include "dynamic_slam/base/test_folder.h"
 
 namespace dynamic_slam {
 namespace {

@@ -1,0 +1,10 @@
+#pragma once
+
+#include <CLI/App.hpp>
+
+namespace dynamic_slam {
+
+// Adds `detect SOURCE`: a detector over a sequence. Runs inside app.parse().
+void AddDetectCommand(CLI::App& app);
+
+}  // namespace dynamic_slam

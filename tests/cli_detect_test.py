@@ -1,0 +1,92 @@
+"""`dynamic_slam detect` and `models` as a user meets them; no network is needed."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = ""
+
+
+def run_program(*arguments, **environment):
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, env={**os.environ, **environment})
+
+
+class CliDetectTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.images = self.path("images")
+        os.makedirs(self.images)
+        for i, (width, height) in enumerate([(64, 48), (64, 48), (80, 60), (64, 48)]):  # grey, of two sizes
+            with open(os.path.join(self.images, f"{i}.pgm"), "wb") as file:
+                file.write(b"P5 %d %d 255\n" % (width, height) + bytes([100]) * (width * height))
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def write(self, name, text):
+        with open(self.path(name), "w") as file:
+            file.write(text)
+        return self.path(name)
+
+    def assert_input_error(self, arguments, *parts):
+        result = run_program(*arguments)
+        self.assertEqual(result.returncode, 2, result)
+        for part in parts:
+            self.assertIn(part, result.stderr)
+
+    def test_boxes_and_pictures_of_all_images_whatever_their_size(self):
+        rows = ["0.0,person,0.9,-5,10,30,20", "0.066666667,car,0.5,70,0,30,20"]
+        boxes = self.write("in.csv", "timestamp,class,score,x,y,w,h\n" + "\n".join(rows) + "\n")
+        result = run_program("detect", self.images, "--detector", "boxes:" + boxes, "--out", self.path("out.csv"),
+                             "--images", self.path("pictures"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("2 boxes in 4 images", result.stdout)
+        self.assertIn("ms an image (median)", result.stdout)
+        with open(self.path("out.csv")) as file:
+            lines = [line.strip().split(",") for line in file]
+        self.assertEqual(lines[0], "timestamp class score x y w h".split())
+        self.assertEqual([(line[1], *map(float, line[2:])) for line in lines[1:]],
+                         [("person", 0.9, 0, 10, 25, 20), ("car", 0.5, 70, 0, 10, 20)], "clipped to the image")
+        self.assertEqual(sorted(os.listdir(self.path("pictures"))), [f"{i:06}.jpg" for i in range(4)])
+
+    def test_every_second_image(self):
+        result = run_program("detect", self.images, "--detector", "hog", "--out", self.path("out.csv"), "--every", "2")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("0 boxes in 2 images", result.stdout)
+
+    def test_errors_come_before_the_first_image(self):
+        out = ["--out", self.path("out.csv")]
+        self.assert_input_error(["detect", self.images, "--detector", "yolox_nan", *out], "Did you mean 'yolox_nano'?")
+        self.assert_input_error(["detect", self.images, "--detector", "none", *out], "detects nothing", "hog")
+        self.assert_input_error(["detect", self.path("none"), "--detector", "hog", *out], "there is no such file")
+        detector = self.write("mine.yaml", "framework: onnx\nmodel: {file: mine.onnx}\nclasses: a, b\n"
+                                           "input: {width: 32, height: 32}\noutput: {decoding: yolox}\n"
+                                           "origin: https://example.org\n")
+        self.assert_input_error(["detect", self.images, "--detector", detector, *out],
+                                "mine.onnx", "Get it from https://example.org", "--models")
+        self.write("mine.onnx", "nonsense")
+        self.assert_input_error(["detect", self.images, "--detector", detector, *out],
+                                "mine.onnx", "cannot be read as a network of onnx", "https://example.org")
+        self.assertFalse(os.path.exists(self.path("out.csv")))
+
+    def test_models_says_what_is_there_and_where_to_get_the_rest(self):
+        models = self.path("models")
+        os.makedirs(models)
+        result = run_program("models", XDG_DATA_HOME=self.folder, DYNAMIC_SLAM_MODELS="")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stdout, r"yolox_nano +missing .*\n +model +yolox_nano_coco.onnx: missing\n"
+                                        r" +licence +Apache-2.0\n +get from +https://github.com/Megvii")
+        self.write("models/yolox_nano_coco.onnx", "nonsense")
+        result = run_program("models", "yolox_nano", "--models", models)
+        self.assertRegex(result.stdout, r"yolox_nano +ready ")
+        self.assertIn("another file than expected: its SHA-256 is", result.stdout)
+        self.assertNotIn("yolo_fastest", result.stdout)
+
+
+if __name__ == "__main__":
+    PROGRAM = os.path.abspath(sys.argv.pop(1))
+    unittest.main()
