@@ -14,9 +14,11 @@
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
+#include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
+#include "overlay_writer.h"
 #include "run_console.h"
 #include "truth_report.h"
 
@@ -32,6 +34,9 @@ struct RunArguments {
   std::string mode = "offline";
   std::string out;
   std::string trace;
+  std::string models;
+  std::string overlay;
+  std::optional<double> detector_latency_ms;
   FrameSourceOptions source_options;
   bool quiet = false;
 };
@@ -75,14 +80,27 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   SystemOptions options;
   if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
   ApplySet(&options, arguments.assignments);
+  if (arguments.detector_latency_ms) options.detector.latency_ms = *arguments.detector_latency_ms;
+  const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   const Camera camera = ChooseCamera(arguments, *source);
   const std::filesystem::path out = OutputFolder(arguments);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
+  system.SetDetector(detector);
   PrepareOutputFolder(out);
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   RunConsole console(arguments.quiet);
-  RunSummary summary = RunSequence(*source, system, console.Control());
+  RunControl control = console.Control();
+  std::optional<OverlayWriter> overlay;
+  if (!arguments.overlay.empty()) {
+    overlay.emplace(arguments.overlay, camera, options.image,
+                    detector == nullptr ? std::vector<std::string>() : detector->class_names());
+    control.on_frame = [&console, &overlay](const RunProgress& progress) {
+      console.Show(progress);
+      overlay->Write(progress);
+    };
+  }
+  RunSummary summary = RunSequence(*source, system, control);
   summary.source = arguments.source;
   console.End();
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
@@ -112,9 +130,14 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                       "YAML file with options (the keys of config.yaml in the results)");
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
       ->type_name("KEY=VALUE");
-  command->add_option("--detector", a.detector, "Object detector")
-      ->check(CLI::IsMember({"none"}))
-      ->capture_default_str();
+  command->add_option("--detector", a.detector, "Object detector: " + DetectorHelp())->capture_default_str();
+  command->add_option("--models", a.models, "Folder in which network files are looked for too");
+  command
+      ->add_option("--detector-latency-ms", a.detector_latency_ms,
+                   "Simulate a network that answers so much later")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--overlay", a.overlay,
+                      "Folder for the frames with their objects: detected red, compensated green");
   command
       ->add_option("--mode", a.mode,
                    "offline: every frame, reproducible. realtime: at the pace of the time stamps; "

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +13,7 @@
 #include "cmd_run.h"
 #include "cmd_simulate.h"
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/worker.h"
 
 namespace {
 
@@ -19,9 +21,7 @@ namespace {
 constexpr int kExitBug = 1;
 constexpr int kExitInput = 2;
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   CLI::App app("Dynamic-SLAM: the path of one camera, and a map of what stands still around it",
                "dynamic_slam");
   app.set_version_flag("--version", "dynamic_slam " DYNAMIC_SLAM_VERSION);
@@ -48,4 +48,16 @@ int main(int argc, char** argv) {
                error.what());
     return kExitBug;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int code = Main(argc, argv);
+  if (dynamic_slam::Worker::AbandonedCount() > 0) {
+    // A network that hangs still runs, and uses what destructors would take away.
+    std::fflush(nullptr);
+    std::_Exit(code);
+  }
+  return code;
 }

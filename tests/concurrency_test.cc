@@ -160,7 +160,7 @@ TEST(ShuffledExecutorTest, KeepsTheContractOfExecutors) {
   for (int i = 0; i < 3; ++i) {
     executor.Post(Lane::kMapping, [&done, i](const std::stop_token&) { done.push_back(i); });
   }
-  executor.Drain();
+  executor.Drain(Lane::kMapping);
   EXPECT_THAT(done, testing::ElementsAre(0, 1, 2));
 
   executor.Post(Lane::kMapping, [](const std::stop_token& token) {
@@ -173,10 +173,10 @@ TEST(ShuffledExecutorTest, KeepsTheContractOfExecutors) {
 
   const auto fail = [](const std::stop_token&) { throw std::runtime_error("disk full"); };
   executor.Post(Lane::kMapping, fail);
-  EXPECT_THROW(executor.Drain(), std::runtime_error);
+  EXPECT_THROW(executor.Drain(Lane::kMapping), std::runtime_error);
   EXPECT_THROW(executor.Post(Lane::kMapping, fail), std::runtime_error);
   executor.Cancel();
-  EXPECT_NO_THROW(executor.Drain());
+  EXPECT_NO_THROW(executor.Drain(Lane::kMapping));
 }
 
 // Whether `trial(seed)` shows the bug for one of the seeds; the first one.
@@ -204,7 +204,7 @@ TEST(PlantedTest, ALostUpdateIsFound) {
     ShuffledExecutor executor(seed);
     executor.Post(Lane::kMapping, [&add](const std::stop_token&) { add(); });
     add();
-    executor.Drain();
+    executor.Drain(Lane::kMapping);
     return *count.Read() != 2;
   };
   EXPECT_TRUE(FirstSeedThatFinds([&](uint64_t seed) { return loses_one(seed, true); }).has_value());
@@ -225,9 +225,9 @@ TEST(PlantedTest, AnEpochThatIsReadTooLateIsFound) {
     ShuffledExecutor executor(seed);
     try {
       for (int i = 0; i < 16; ++i) {
-        const TrackingResult result = tracker.Track(FrameId(static_cast<uint32_t>(i)), room.Stamp(i),
-                                                    i < 12 ? room.image(i) : SmallRoom::BlackImage(), {},
-                                                    executor.Waiting(Lane::kMapping));
+        tracker.Extract(FrameId(static_cast<uint32_t>(i)), room.Stamp(i),
+                        i < 12 ? room.image(i) : SmallRoom::BlackImage(), {});
+        const TrackingResult result = tracker.Track(executor.Waiting(Lane::kMapping));
         for (const KeyframeId keyframe : result.new_keyframes) {
           executor.Post(Lane::kMapping,
                         [&, planted, keyframe, epoch = result.map_epoch](const std::stop_token&) {
@@ -235,7 +235,7 @@ TEST(PlantedTest, AnEpochThatIsReadTooLateIsFound) {
                         });
         }
       }
-      executor.Drain();
+      executor.Drain(Lane::kMapping);
     } catch (const InternalError&) {
       return true;
     }

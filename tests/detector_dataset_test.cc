@@ -55,7 +55,7 @@ TEST_P(DetectorDatasetTest, TheSameImageGivesTheSameBoxes) {
 
 INSTANTIATE_TEST_SUITE_P(Networks, DetectorDatasetTest,
                          testing::Values("yolox_nano", "ssd_mobilenet_v1", "yolo_fastest", "yolov3_nano_voc"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& tested) { return std::string(tested.param); });
 
 }  // namespace
 }  // namespace dynamic_slam

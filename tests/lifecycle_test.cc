@@ -38,7 +38,7 @@ class FaultyExecutor : public Executor {
     });
   }
   int Waiting(Lane lane) const override { return executor_->Waiting(lane); }
-  void Drain() override { executor_->Drain(); }
+  void Drain(Lane lane) override { executor_->Drain(lane); }
   void Cancel() override { executor_->Cancel(); }
   void ThrowIfFailed() const override { executor_->ThrowIfFailed(); }
 

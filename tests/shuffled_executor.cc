@@ -49,7 +49,7 @@ int ShuffledExecutor::Waiting(Lane lane) const {
   return static_cast<int>(lanes_[static_cast<size_t>(lane)].tasks.size());
 }
 
-void ShuffledExecutor::Drain() {
+void ShuffledExecutor::Drain(Lane) {
   {
     MutexLock lock(mutex_);
     WaitUntilIdle();

@@ -28,7 +28,7 @@ class ShuffledExecutor : public Executor, public Scheduler {
 
   void Post(Lane lane, Task task) override;
   int Waiting(Lane lane) const override;
-  void Drain() override;
+  void Drain(Lane lane) override;  // all lanes
   void Cancel() override;
   void ThrowIfFailed() const override;
 

@@ -1,10 +1,14 @@
 #include "dynamic_slam/system/executor.h"
 
 #include <array>
+#include <chrono>
 #include <exception>
 
 namespace dynamic_slam {
 namespace {
+
+// A network cannot be interrupted.
+constexpr std::chrono::milliseconds kDetectorPatience(1000);
 
 class InlineExecutor : public Executor {
  public:
@@ -18,7 +22,7 @@ class InlineExecutor : public Executor {
     }
   }
   int Waiting(Lane) const override { return 0; }
-  void Drain() override { ThrowIfFailed(); }
+  void Drain(Lane) override { ThrowIfFailed(); }
   void Cancel() override { failure_ = nullptr; }
   void ThrowIfFailed() const override {
     if (failure_ != nullptr) std::rethrow_exception(failure_);
@@ -31,13 +35,15 @@ class InlineExecutor : public Executor {
 class ThreadedExecutor : public Executor {
  public:
   ThreadedExecutor() {
-    for (const Lane lane : kLanes) workers_[Index(lane)] = std::make_unique<Worker>(Name(lane));
+    for (const Lane lane : kLanes) {
+      const bool may_hang = lane == Lane::kDetection;
+      workers_[Index(lane)] =
+          std::make_unique<Worker>(Name(lane), may_hang ? kDetectorPatience : Worker::kForever);
+    }
   }
   void Post(Lane lane, Task task) override { workers_[Index(lane)]->Post(std::move(task)); }
   int Waiting(Lane lane) const override { return static_cast<int>(workers_[Index(lane)]->Waiting()); }
-  void Drain() override {
-    for (const auto& worker : workers_) worker->Drain();
-  }
+  void Drain(Lane lane) override { workers_[Index(lane)]->Drain(); }
   void Cancel() override {
     for (const auto& worker : workers_) worker->Cancel();
   }
@@ -57,6 +63,8 @@ TraceName Name(Lane lane) {
   switch (lane) {
     case Lane::kMapping:
       return "mapping";
+    case Lane::kDetection:
+      return "detection";
   }
   return "";
 }

@@ -7,8 +7,8 @@
 namespace dynamic_slam {
 
 // A queue of tasks that run one after the other. Tracking has none: it runs on the caller's thread.
-enum class Lane { kMapping };
-inline constexpr Lane kLanes[] = {Lane::kMapping};
+enum class Lane { kMapping, kDetection };
+inline constexpr Lane kLanes[] = {Lane::kMapping, Lane::kDetection};
 
 TraceName Name(Lane lane);
 
@@ -26,10 +26,11 @@ class Executor {
   // Tasks that have not begun. Tasks may ask too.
   virtual int Waiting(Lane lane) const = 0;
 
-  // Returns when all tasks are done.
-  virtual void Drain() = 0;
+  // Returns when all tasks of the lane are done.
+  virtual void Drain(Lane lane) = 0;
 
-  // Drops the tasks that wait, asks those that run to stop, and returns when they have.
+  // Drops the tasks that wait, asks those that run to stop, and returns when they have. A detector that does
+  // not is abandoned after a second: its tasks must own what they touch.
   virtual void Cancel() = 0;
 
   virtual void ThrowIfFailed() const = 0;

@@ -51,6 +51,18 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                      {"keyframes_abandoned", summary.mapping.keyframes_abandoned},
                      {"bundles_stopped", summary.mapping.bundles_stopped},
                      {"most_keyframes_waiting", summary.most_keyframes_waiting}};
+  if (summary.detection.has_value()) {
+    const DetectionReport& detection = *summary.detection;
+    json["detector"] = {{"name", summary.detector},
+                        {"asked", detection.asked},
+                        {"on_time", detection.on_time},
+                        {"late", detection.late},
+                        {"failed", detection.failed},
+                        {"last_failure", detection.last_failure},
+                        {"ms", ToJson(SummariseTimes(detection.times_ms))}};
+  } else {
+    json["detector"] = {{"name", summary.detector}};
+  }
   json["final_bundle"] = {{"done", summary.final_bundle.usable},
                           {"stopped", summary.final_bundle.stopped},
                           {"iterations", summary.final_bundle.iterations},
@@ -82,11 +94,11 @@ void WriteText(const std::filesystem::path& file, const std::string& text) {
 }
 
 std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
-  std::string csv = "timestamp,state,keypoints,inliers,keyframe,tracking_ms,reason\n";
+  std::string csv = "timestamp,state,keypoints,inliers,keyframe,detection,objects,tracking_ms,reason\n";
   for (const RunSummary::FrameRecord& frame : frames) {
-    csv += fmt::format("{:.9f},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state),
-                       frame.keypoints, frame.inliers, Name(frame.keyframe_reason), frame.tracking_ms,
-                       frame.reason);
+    csv += fmt::format("{:.9f},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state),
+                       frame.keypoints, frame.inliers, Name(frame.keyframe_reason), Name(frame.detection),
+                       frame.objects, frame.tracking_ms, frame.reason);
   }
   return csv;
 }

@@ -34,7 +34,9 @@ struct RunSummary {
   TimeStatistics tracking_ms;  // of the tracked frames
   TimeStatistics mapping_ms;   // of the keyframes; not in tracking_ms
   MappingReport mapping;
-  int most_keyframes_waiting = 0;  // for local mapping, at any time
+  std::string detector = "none";
+  std::optional<DetectionReport> detection;  // of the detector, if there is one
+  int most_keyframes_waiting = 0;            // for local mapping, at any time
   BundleSummary final_bundle;
   double startup_s = 0;  // from the start of the process to the first frame
   double wall_s = 0;     // from the first frame to the final map
@@ -50,6 +52,8 @@ struct RunSummary {
     TrackingState state = TrackingState::kInitialising;
     int keypoints = 0, inliers = 0;
     KeyframeReason keyframe_reason = KeyframeReason::kNone;
+    DetectionState detection = DetectionState::kOff;
+    size_t objects = 0;  // seen or believed to be in the frame
     double tracking_ms = 0;
     std::string reason;
   };

@@ -59,7 +59,8 @@ class FrameLog {
     was_tracking_ = is_tracking;
     summary_->most_keyframes_waiting = std::max(summary_->most_keyframes_waiting, result.keyframes_waiting);
     summary_->frames.push_back({timestamp_s, tracking.state, tracking.keypoints, tracking.inliers,
-                                tracking.keyframe_reason, result.tracking_ms, tracking.reason});
+                                tracking.keyframe_reason, result.objects.state, result.objects.boxes.size(),
+                                result.tracking_ms, tracking.reason});
     summary_->last_reason = is_tracking ? "" : tracking.reason;
   }
 
@@ -106,7 +107,8 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
       }
       const FrameResult result = system.Process(image->timestamp_s, image->image);
       log.Add(image->timestamp_s, result);
-      if (control.on_frame) control.on_frame({summary.frames.size(), announced, &result, &system.map()});
+      if (control.on_frame)
+        control.on_frame({summary.frames.size(), announced, &*image, &result, &system.map()});
     }
     end_feed();
     if (summary.interrupted) system.Stop();
@@ -131,6 +133,8 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
     summary.landmarks = map->landmarks().size();
   }
   summary.mapping = system.mapping_report();
+  if (system.detector() != nullptr) summary.detector = system.detector()->name();
+  summary.detection = system.detection_report();
   summary.tracking_ms = log.TrackingTimes();
   summary.mapping_ms = SummariseTimes(summary.mapping.times_ms);
   summary.peak_rss_mb = PeakRssMb();

@@ -12,6 +12,7 @@ namespace dynamic_slam {
 struct RunProgress {
   size_t frame = 0;
   size_t frames_total = 0;  // 0 when unknown
+  const SourceImage* image = nullptr;
   const FrameResult* result = nullptr;
   const SharedMap* map = nullptr;
 };

@@ -49,9 +49,23 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   const auto start = std::chrono::steady_clock::now();
   preparer_.Prepare(image, &grey_);
   result.id = FrameId(frame_count_++);
+  double asking_ms = 0;  // inline, the detector itself
+  if (detection_.has_value() && detection_->Begin(result.id, timestamp_s)) {
+    cv::Mat colour;  // the detector keeps it
+    preparer_.PrepareColour(image, &colour);
+    const auto asked = std::chrono::steady_clock::now();
+    detection_->Submit(result.id, timestamp_s, colour);
+    asking_ms = MillisecondsSince(asked);
+  }
   tracker_.Extract(result.id, timestamp_s, grey_, preparer_.MergedMask(mask));
+  if (detection_.has_value()) {
+    result.objects = detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation());
+  }
   result.tracking = tracker_.Track(executor_->Waiting(Lane::kMapping));
-  result.tracking_ms = MillisecondsSince(start);
+  if (const auto rotation = tracker_.Rotation(); rotation.has_value() && detection_.has_value()) {
+    detection_->SetRotation(result.id, *rotation);
+  }
+  result.tracking_ms = MillisecondsSince(start) - asking_ms;
 
   if (result.tracking.map_was_reset) tracked_.clear();
   if (result.tracking.state == TrackingState::kTracking) {
@@ -91,8 +105,16 @@ void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::sto
 BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   DS_TRACE("finish");
   if (is_stopped_) return {};
-  executor_->Drain();
+  executor_->Drain(Lane::kMapping);
   return options_.final_bundle ? mapper_.Finish(should_stop) : BundleSummary();
+}
+
+void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
+  DS_CHECK(frame_count_ == 0, "frames={}", frame_count_);
+  detection_.reset();
+  if (detector != nullptr) {
+    detection_.emplace(std::move(detector), options_.detector, camera(), executor_.get());
+  }
 }
 
 void SlamSystem::Stop() {
@@ -103,6 +125,7 @@ void SlamSystem::Stop() {
 void SlamSystem::Reset() {
   executor_->Cancel();
   tracker_.Reset();
+  if (detection_.has_value()) detection_->Reset();
   tracked_.clear();
   *mapping_report_.Write() = MappingReport();
   frame_count_ = 0;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -12,6 +13,7 @@
 #include "dynamic_slam/io/image_preparer.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/local_mapper.h"
+#include "dynamic_slam/system/detection_stage.h"
 #include "dynamic_slam/system/executor.h"
 #include "dynamic_slam/system/system_options.h"
 #include "dynamic_slam/tracking/tracker.h"
@@ -29,6 +31,7 @@ const char* Name(RunMode mode);
 struct FrameResult {
   FrameId id;
   TrackingResult tracking;
+  FrameObjects objects;
   double tracking_ms = 0;     // from the image in memory to its pose
   int keyframes_waiting = 0;  // for local mapping, when the frame was done
 };
@@ -55,6 +58,10 @@ class SlamSystem {
              std::unique_ptr<Executor> executor);
   ~SlamSystem();
 
+  // Tracking is told of the objects that this detector sees, from the next image on; null: of none. To be
+  // called before the first image.
+  void SetDetector(std::shared_ptr<Detector> detector);
+
   // image: of the raw camera's size, any type that ImagePreparer takes. mask: empty, or CV_8UC1 of camera()'s
   // size, not 0 where keypoints are forbidden, beside those of the static mask. Throws InputError, and
   // changes nothing, when the image cannot be prepared.
@@ -79,6 +86,11 @@ class SlamSystem {
   // Frames of FrameTrajectory that had their pose when their turn came.
   size_t LiveFrameCount() const;
 
+  // None without a detector.
+  std::optional<DetectionReport> detection_report() const {
+    return detection_.has_value() ? std::optional(detection_->report()) : std::nullopt;
+  }
+  const Detector* detector() const { return detection_.has_value() ? &detection_->detector() : nullptr; }
   MappingReport mapping_report() const { return *mapping_report_.Read(); }
   RunMode mode() const { return mode_; }
   const SharedMap& map() const { return map_; }
@@ -104,6 +116,7 @@ class SlamSystem {
   Tracker tracker_;
   LocalMapper mapper_;
   Guarded<MappingReport> mapping_report_;
+  std::optional<DetectionStage> detection_;
   std::vector<TrackedFrame> tracked_;
   uint32_t frame_count_ = 0;
   cv::Mat grey_;  // the image in work

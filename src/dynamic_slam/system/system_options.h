@@ -6,6 +6,7 @@
 #include "dynamic_slam/features/orb_options.h"
 #include "dynamic_slam/io/image_options.h"
 #include "dynamic_slam/mapping/mapper_options.h"
+#include "dynamic_slam/system/detection_options.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 
 namespace dynamic_slam {
@@ -14,6 +15,7 @@ struct SystemOptions {
   uint64_t seed = 1;
   bool final_bundle = true;
   ImageOptions image;
+  DetectionOptions detector;
   OrbOptions orb;
   TrackerOptions tracker;
   MapperOptions mapper;
@@ -25,6 +27,7 @@ struct SystemOptions {
     visit("final_bundle", self.final_bundle,
           OptionField{"", 0, 1, "Adjust the whole map once more when the sequence is over."});
     visit("image", self.image);
+    visit("detector", self.detector);
     visit("orb", self.orb);
     visit("tracker", self.tracker);
     visit("mapper", self.mapper);

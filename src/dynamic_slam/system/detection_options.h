@@ -1,0 +1,29 @@
+#pragma once
+
+#include "dynamic_slam/base/option_field.h"
+#include "dynamic_slam/semantics/make_compensation.h"
+
+namespace dynamic_slam {
+
+struct DetectionOptions {
+  int every = 1;
+  double deadline_ms = 5;
+  double latency_ms = 0;
+  CompensationOptions compensation;
+
+  template <class Self, class Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("every", self.every, OptionField{"", 1, 1000, "The detector is asked about each n-th frame only."});
+    visit(
+        "deadline_ms", self.deadline_ms,
+        OptionField{"ms", 0, 10000,
+                    "How long tracking, done with extraction, waits for the objects of its frame; later ones "
+                    "are predicted."});
+    visit("latency_ms", self.latency_ms,
+          OptionField{"ms", 0, 60000,
+                      "Answers are kept back until the stamps are so much later: a simulated slow network."});
+    visit("compensation", self.compensation);
+  }
+};
+
+}  // namespace dynamic_slam

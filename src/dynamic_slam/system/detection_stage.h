@@ -1,0 +1,100 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <opencv2/core/mat.hpp>
+
+#include "dynamic_slam/base/guarded.h"
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/semantics/box_compensation.h"
+#include "dynamic_slam/semantics/detection_exchange.h"
+#include "dynamic_slam/semantics/detector.h"
+#include "dynamic_slam/system/detection_options.h"
+#include "dynamic_slam/system/executor.h"
+
+namespace dynamic_slam {
+
+enum class DetectionState {
+  kOff,       // there is no detector
+  kOnTime,    // the boxes are those of this frame
+  kNotAsked,  // this frame is not every n-th, or the detector is busy with an earlier one
+  kLate,      // the detector was asked about this frame, and has not answered yet
+  kFailed,    // it answered that it cannot
+};
+
+const char* Name(DetectionState state);
+
+// The objects in a frame, as far as they are known when tracking needs them.
+struct FrameObjects {
+  DetectionState state = DetectionState::kOff;
+  std::string reason;  // of a failure
+  std::vector<CompensatedBox> boxes;
+};
+
+// What the detector has done so far.
+struct DetectionReport {
+  int asked = 0, on_time = 0, late = 0, failed = 0;
+  std::string last_failure;
+  std::vector<double> times_ms;  // of the detector
+};
+
+// The detector beside tracking (section 3.3): asked about a frame while tracking extracts its features, read
+// when tracking needs the boxes, never waited for beyond a deadline. A missing result is a missed detection,
+// which the compensation covers (section 3.1); when it comes later, it still corrects the compensation.
+//
+// One frame at a time is with the detector; others are not asked about meanwhile.
+class DetectionStage {
+ public:
+  DetectionStage(std::shared_ptr<Detector> detector, const DetectionOptions& options, const Camera& camera,
+                 Executor* executor);
+
+  // To be called first for each frame: takes an answer that came late. Whether the detector should be asked
+  // about this frame.
+  bool Begin(FrameId frame, double timestamp_s);
+
+  // Asks about the image (as Detector takes it), which must not change any more.
+  void Submit(FrameId frame, double timestamp_s, const cv::Mat& image);
+
+  // The boxes of the frame, whether it was asked about or not. cam_from_last: as far as it is known.
+  FrameObjects Collect(FrameId frame, double timestamp_s,
+                       const std::optional<Eigen::Quaterniond>& cam_from_last);
+
+  // How the camera turned after all.
+  void SetRotation(FrameId frame, const Eigen::Quaterniond& cam_from_last);
+
+  void Reset();
+
+  const Detector& detector() const { return *detector_; }
+  DetectionReport report() const;
+
+ private:
+  struct Question {
+    FrameId frame;
+    double answer_due_s;  // not used before this stamp: a simulated slow network
+  };
+  // What the task in the detector's lane writes; it may outlive the stage.
+  struct Shared {
+    DetectionExchange exchange;
+    Guarded<std::vector<double>> times_ms;
+  };
+
+  // The answer to the open question, if it is due and there by the deadline; a failure is noted and no
+  // answer.
+  std::optional<DetectionResult> TakeAnswer(double timestamp_s, double patience_ms);
+
+  std::shared_ptr<Detector> detector_;
+  DetectionOptions options_;
+  Executor* executor_;
+  std::unique_ptr<BoxCompensation> compensation_;
+  std::shared_ptr<Shared> shared_;
+  std::optional<Question> open_;
+  std::optional<DetectionResult> answer_;  // that came before it was due
+  std::string failure_;                    // of an answer taken in this frame
+  DetectionReport report_;
+};
+
+}  // namespace dynamic_slam
