@@ -151,7 +151,7 @@ class CliRunTest(unittest.TestCase):
         self.assert_input_error([self.room, "--set", "image.crop_left=600"], "crop_left", "principal point",
                                 "Choose a part")
         self.assert_input_error([self.room, "--set", "image.bayer=rgb"], "image.bayer", "'rgb'", "rggb")
-        self.assert_input_error([self.room, "--detector", "magic"], "--detector")
+        self.assert_input_error([self.room, "--detector", "magic"], "detector 'magic'", "Known names: none, hog")
         self.assert_input_error([self.room, "--mode", "fast"], "--mode")
 
     def test_a_folder_that_cannot_be_written_is_an_input_error(self):
