@@ -47,6 +47,20 @@ TEST_F(DatasetTest, Kitti00First200) {
 
 TEST_F(DatasetTest, RedKitchen) { Check("sevenscenes_redkitchen", "sevenscenes", 0.05, 0.95); }
 
+// How accurate a run in real time is depends on the machine and what else it does; these hold on any.
+TEST_F(DatasetTest, Fr1DeskInRealTime) {
+  const std::filesystem::path sequence = SharedData() / "tum_fr1_desk";
+  if (!std::filesystem::exists(sequence)) GTEST_SKIP() << sequence << " does not exist";
+  const auto source = OpenFrameSource(sequence);
+  SlamSystem system(LoadCamera("tum_fr1"), {}, RunMode::kRealtime);
+  const RunSummary summary = RunSequence(*source, system);
+  EXPECT_EQ(summary.failure, nullptr) << FailureMessage(summary);
+  EXPECT_TRUE(summary.initialised_at.has_value()) << summary.last_reason;
+  EXPECT_LE(summary.most_keyframes_waiting, 5);
+  EXPECT_EQ(summary.frames.size() + summary.frames_dropped + summary.skipped.size(), 613u);
+  EXPECT_THAT(system.map().Read()->Validate(), testing::IsEmpty());
+}
+
 TEST_F(DatasetTest, TwoRunsOfFr1DeskGiveTheSameBytes) {
   const std::filesystem::path sequence = SharedData() / "tum_fr1_desk";
   if (!std::filesystem::exists(sequence)) GTEST_SKIP() << sequence << " does not exist";

@@ -13,8 +13,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// As many as the drivers of cameras usually keep.
-constexpr size_t kWaitingImages = 4;
+// Half a second at 30 frames a second, which a start may take; tracking is several times faster than a camera
+// and soon catches up. A start that misses frames is slower, and sometimes wrong.
+constexpr size_t kWaitingImages = 15;
 
 // A recording may have a gap of hours; nobody waits for that.
 constexpr double kLongestPauseS = 1.0;

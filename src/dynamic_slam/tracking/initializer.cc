@@ -36,6 +36,7 @@ void Initializer::Reset() {
 }
 
 void Initializer::StartFrom(const Frame& frame) {
+  most_matches_ = 0;
   reference_ = frame;
   views_ = {};
   for (uint32_t i = 0; i < frame.features.size(); ++i) {
@@ -96,9 +97,12 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
     return std::nullopt;
   }
   std::vector<Match> matches = MatchWithReference(frame);
-  if (static_cast<int>(matches.size()) < options_.min_matches) {
-    reason_ = fmt::format("initialising: {} matches < {} with the first view; starting again from this one",
-                          matches.size(), options_.min_matches);
+  most_matches_ = std::max(most_matches_, matches.size());
+  const double min_matches = std::max(static_cast<double>(options_.min_matches),
+                                      options_.min_match_ratio * static_cast<double>(most_matches_));
+  if (static_cast<double>(matches.size()) < min_matches) {
+    reason_ = fmt::format("initialising: {} matches < {:.0f} with the first view; starting again from this one",
+                          matches.size(), min_matches);
     StartFrom(frame);
     return std::nullopt;
   }

@@ -10,6 +10,7 @@ namespace dynamic_slam {
 struct InitializerOptions {
   double feature_factor = 5.0;
   int min_matches = 100;
+  double min_match_ratio = 0.5;
   double search_radius_px = 100;
   int max_octave = 3;
   double max_cost_ratio = 0.75;
@@ -22,6 +23,10 @@ struct InitializerOptions {
     visit("min_matches", self.min_matches,
           OptionField{"", 20, 5000,
                       "With fewer matches to the reference frame, the current frame takes its place."});
+    visit("min_match_ratio", self.min_match_ratio,
+          OptionField{"", 0, 1,
+                      "The same below this part of the most matches that the reference frame had: those that "
+                      "are left tell too little of which motion it was."});
     visit("search_radius_px", self.search_radius_px,
           OptionField{"px", 5, 1000, "How far from its last place a keypoint is looked for."});
     visit("max_octave", self.max_octave,
