@@ -29,7 +29,7 @@ int Main(int argc, char** argv) {
   int exit_code = 0;
   dynamic_slam::AddRunCommand(app, &exit_code);
   dynamic_slam::AddEvalCommand(app);
-  dynamic_slam::AddDetectCommand(app);
+  dynamic_slam::AddDetectCommand(app, &exit_code);
   dynamic_slam::AddModelsCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);

@@ -58,6 +58,40 @@ class CliDetectTest(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("0 boxes in 2 images", result.stdout)
 
+    def test_compares_with_the_truth_before_and_after_compensation(self):
+        # One person in all of 12 images; the detector misses it in the last.
+        images = self.path("many")
+        os.makedirs(images)
+        for i in range(12):
+            with open(os.path.join(images, f"{i:02}.pgm"), "wb") as file:
+                file.write(b"P5 64 48 255\n" + bytes([100]) * (64 * 48))
+        stamps = [f"{i / 30:.9f}" for i in range(12)]
+        truth = self.write("truth.csv", "timestamp,actor,x,y,w,h,visible\n"
+                           + "".join(f"{t},0,10,10,20,30,1\n" for t in stamps))
+        boxes = self.write("in.csv", "timestamp,class,score,x,y,w,h\n"
+                           + "".join(f"{t},person,0.9,10,10,20,30\n" for t in stamps[:11]))
+        arguments = ["detect", images, "--detector", "boxes:" + boxes, "--out", self.path("out.csv"),
+                     "--truth", truth]
+        result = run_program(*arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("12 true boxes of persons in 12 frames", result.stdout)
+        self.assertRegex(result.stdout, r"detector +0.917 +1.000 +0.083 +0.917 +0.917\n")
+        self.assertNotIn("tracker", result.stdout)
+        for method in "paper", "tracker":
+            filled = self.path(method + ".csv")
+            result = run_program(*arguments, "--compensation", method, "--out-compensated", filled)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertRegex(result.stdout, method + r" +1.000 +1.000 +0.000 +1.000 +1.000\n")
+            with open(filled) as file:
+                self.assertEqual(len(file.readlines()), 13)
+        # 100 ms later: the first three images are without boxes, all others have them.
+        result = run_program(*arguments, "--compensation", "tracker", "--detector-latency-ms", "100")
+        self.assertRegex(result.stdout, r"tracker +0.750 +1.000 +0.250 +0.750 +0.750\n")
+
+    def test_latency_needs_a_compensation(self):
+        self.assert_input_error(["detect", self.images, "--detector", "hog", "--out", self.path("out.csv"),
+                                 "--detector-latency-ms", "100"], "--compensation tracker")
+
     def test_errors_come_before_the_first_image(self):
         out = ["--out", self.path("out.csv")]
         self.assert_input_error(["detect", self.images, "--detector", "yolox_nan", *out], "Did you mean 'yolox_nano'?")

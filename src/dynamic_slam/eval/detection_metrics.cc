@@ -40,15 +40,11 @@ DetectionMetrics CompareFrame(std::span<const BoxRecord> truth, std::span<const 
     size_t best = targets.size();
     double best_iou = 0;
     for (size_t t = 0; t < targets.size(); ++t) {
+      if (is_taken[t] || targets[t]->class_name != candidate->class_name) continue;
       const double iou = IoU(targets[t]->box, candidate->box);
-      if (is_taken[t] || iou < options.min_iou || iou <= 0) continue;
-      if (!options.class_name.empty() || targets[t]->class_name == candidate->class_name) {
-        const bool is_better = best == targets.size() || counts(t) > counts(best) ||
-                               (counts(t) == counts(best) && iou > best_iou);
-        if (!is_better) continue;
-        best = t;
-        best_iou = iou;
-      }
+      if (iou < options.min_iou || iou <= best_iou) continue;
+      best = t;
+      best_iou = iou;
     }
     if (best == targets.size()) {
       ++metrics.false_alarms;

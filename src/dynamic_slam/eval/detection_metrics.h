@@ -41,8 +41,9 @@ struct DetectionMetrics {
   }
 };
 
-// The boxes of one frame, whatever their stamps: best score first, each found box takes the true box that it
-// overlaps most of those that are not taken, if by min_iou; visible ones go before those that are ignored.
+// The boxes of one frame, whatever their stamps. Best score first, each found box takes the true box of its
+// class that it overlaps most, by at least min_iou, of those that are not taken, hardly visible ones
+// included: so a box that fits a hidden object best is never counted as the one in front of it.
 DetectionMetrics CompareFrame(std::span<const BoxRecord> truth, std::span<const BoxRecord> found,
                               const DetectionMetricsOptions& options);
 

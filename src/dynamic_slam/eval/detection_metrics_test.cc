@@ -49,9 +49,21 @@ TEST(DetectionMetrics, HardlyVisibleTruthIsNeitherHitNorMiss) {
   EXPECT_EQ(metrics.misses, 0u);
   EXPECT_EQ(metrics.ignored, 1u);
   EXPECT_EQ(metrics.false_alarms, 1u);  // the second box on the same truth
-  // A found box prefers the truth that counts, even where the other one fits better.
-  const std::vector<BoxRecord> both = {Truth(0, 10, 0.1), Truth(0, 0)};
-  EXPECT_EQ(CompareBoxes(both, std::vector{Found(0, 10)}, {}).hits, 1u);
+}
+
+TEST(DetectionMetrics, AFoundBoxTakesTheTruthThatItFitsBestVisibleOrNot) {
+  const std::vector<BoxRecord> truth = {Truth(0, 10, 0.1), Truth(0, 0)};
+  DetectionMetrics metrics = CompareBoxes(truth, std::vector{Found(0, 10)}, {});
+  EXPECT_EQ(metrics.hits, 0u);
+  EXPECT_EQ(metrics.misses, 1u);
+  EXPECT_EQ(metrics.ignored, 1u);
+  EXPECT_EQ(metrics.false_alarms, 0u);
+  EXPECT_EQ(metrics.frames, 1u);
+  EXPECT_EQ(metrics.frames_hit, 0u);
+  // Taken once, it leaves the other one to the next box.
+  metrics = CompareBoxes(truth, std::vector{Found(0, 10), Found(0, 9, 0.5)}, {});
+  EXPECT_EQ(metrics.hits, 1u);
+  EXPECT_EQ(metrics.ignored, 1u);
 }
 
 TEST(DetectionMetrics, OtherClassesAndLowScoresAreNotLookedAt) {

@@ -68,7 +68,7 @@ void BoxFilter::Predict(const BoxFilterOptions& options, double elapsed_s) {
 }
 
 void BoxFilter::Follow(const BoxFilterOptions& options, double elapsed_s, const Eigen::Vector2d& shift_px,
-                       double scale) {
+                       double scale, const Eigen::Vector2d& background_px) {
   const double size = Size(axes_[2].value, axes_[3].value);
   const std::array<Axis, 4> before = axes_;
   Predict(options, elapsed_s);
@@ -80,8 +80,9 @@ void BoxFilter::Follow(const BoxFilterOptions& options, double elapsed_s, const 
     axis.value_value = before[i].value_value + variance;
     axis.value_rate = 0;
     // The shift measures the rate too.
+    const double own_shift = i < 2 ? shifts[i] - background_px[i] : shifts[i];
     const double gain = axis.rate_rate / (axis.rate_rate + variance / Square(elapsed_s));
-    axis.rate += gain * (shifts[i] / elapsed_s - axis.rate);
+    axis.rate += gain * (own_shift / elapsed_s - axis.rate);
     axis.rate_rate *= 1 - gain;
   }
 }
@@ -96,11 +97,12 @@ void BoxFilter::Move(const Eigen::Vector2d& shift_px, const Eigen::Matrix2d& jac
   }
 }
 
-void BoxFilter::Update(const BoxFilterOptions& options, const Box& detected) {
+void BoxFilter::Update(const BoxFilterOptions& options, const Box& detected, double noise_factor) {
   const std::array<double, 4> measured = Measured(detected);
   const double size = Size(axes_[2].value, axes_[3].value);
   for (int i = 0; i < 4; ++i) {
-    axes_[i].Update(measured[i], Square(i < 2 ? options.position_noise * size : options.extent_noise));
+    const double noise = i < 2 ? options.position_noise * size : options.extent_noise;
+    axes_[i].Update(measured[i], Square(noise_factor * noise));
   }
 }
 

@@ -55,20 +55,22 @@ class BoxFilter {
   // `elapsed_s` > 0 later.
   void Predict(const BoxFilterOptions& options, double elapsed_s);
 
-  // The same when the centre was seen to move by `shift_px` and the box to grow by `scale`.
+  // The same when the centre was seen to move by `shift_px`, `background_px` of it because the image moves,
+  // and the box to grow by `scale`.
   void Follow(const BoxFilterOptions& options, double elapsed_s, const Eigen::Vector2d& shift_px,
-              double scale);
+              double scale, const Eigen::Vector2d& background_px);
 
   // The image moved below the box: the centre by `shift_px`, small vectors about it by `jacobian`.
   void Move(const Eigen::Vector2d& shift_px, const Eigen::Matrix2d& jacobian);
 
-  void Update(const BoxFilterOptions& options, const Box& detected);
+  // `noise_factor` > 1 for a detection with more noise than others.
+  void Update(const BoxFilterOptions& options, const Box& detected, double noise_factor = 1);
 
   // Squared distance of a detection from the prediction in sigmas, four degrees of freedom.
   double SquaredDistance(const BoxFilterOptions& options, const Box& detected) const;
 
   Box box() const;                        // may reach out of the image
-  Eigen::Vector2d velocity_px_s() const;  // of the centre
+  Eigen::Vector2d velocity_px_s() const;  // of the centre, without the image's motion
 
  private:
   struct Axis {

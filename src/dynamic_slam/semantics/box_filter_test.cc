@@ -34,7 +34,7 @@ TEST(BoxFilter, LearnsAConstantVelocityAndKeepsItForAMoment) {
 TEST(BoxFilter, ForgetsTheVelocityOfWhatItDoesNotSee) {
   BoxFilterOptions options;
   BoxFilter filter(options, kBox);
-  filter.Follow(options, 1 / 30.0, {10, 0}, 1);
+  filter.Follow(options, 1 / 30.0, {10, 0}, 1, {0, 0});
   const double speed = filter.velocity_px_s().x();
   EXPECT_GT(speed, 0);
   filter.Predict(options, options.velocity_memory_s);
@@ -46,7 +46,7 @@ TEST(BoxFilter, OneStepIsAsGoodAsTwo) {
   BoxFilterOptions options;
   options.velocity_noise = options.extent_rate_noise = 0;
   BoxFilter once(options, kBox);
-  once.Follow(options, 0.1, {20, -10}, 1.05);
+  once.Follow(options, 0.1, {20, -10}, 1.05, {0, 0});
   BoxFilter twice = once;
   once.Predict(options, 0.5);
   twice.Predict(options, 0.2);
@@ -59,7 +59,7 @@ TEST(BoxFilter, OneStepIsAsGoodAsTwo) {
 
 TEST(BoxFilter, FollowsAShiftAndAScale) {
   BoxFilter filter({}, kBox);
-  filter.Follow({}, 1 / 30.0, {7, -3}, 1.1);
+  filter.Follow({}, 1 / 30.0, {7, -3}, 1.1, {0, 0});
   EXPECT_NEAR(filter.box().CenterX(), 157, 1e-9);
   EXPECT_NEAR(filter.box().CenterY(), 197, 1e-9);
   EXPECT_NEAR(filter.box().width, 110, 1e-9);
@@ -77,7 +77,7 @@ TEST(BoxFilter, ADistanceShrinksAsTheUncertaintyGrows) {
 
 TEST(BoxFilter, ATurnOfTheImageTurnsTheVelocity) {
   BoxFilter filter({}, kBox);
-  filter.Follow({}, 1 / 30.0, {10, 0}, 1);
+  filter.Follow({}, 1 / 30.0, {10, 0}, 1, {0, 0});
   const double speed = filter.velocity_px_s().x();
   Eigen::Matrix2d quarter;
   quarter << 0, -1, 1, 0;
@@ -85,6 +85,23 @@ TEST(BoxFilter, ATurnOfTheImageTurnsTheVelocity) {
   EXPECT_NEAR(filter.velocity_px_s().y(), speed, 1e-9);
   EXPECT_NEAR(filter.box().CenterX(), 165, 1e-9);
   EXPECT_NEAR(filter.box().width, 100, 1e-9);
+}
+
+TEST(BoxFilter, TheBackgroundsMotionIsNotTheObjects) {
+  BoxFilter filter({}, {100, 100, 50, 100});
+  for (int i = 0; i < 20; ++i) filter.Follow({}, 1 / 30.0, {10, 0}, 1, {10, 0});
+  EXPECT_NEAR(filter.box().x, 300, 1e-9);
+  EXPECT_NEAR(filter.velocity_px_s().x(), 0, 1e-9);
+}
+
+TEST(BoxFilter, ANoisierDetectionMovesItLess) {
+  BoxFilter sure({}, {100, 100, 50, 100});
+  sure.Predict({}, 1 / 30.0);
+  BoxFilter doubtful = sure;
+  sure.Update({}, {110, 100, 50, 100});
+  doubtful.Update({}, {110, 100, 50, 100}, 4);
+  EXPECT_GT(doubtful.box().x, 100);
+  EXPECT_LT(doubtful.box().x, sure.box().x);
 }
 
 }  // namespace

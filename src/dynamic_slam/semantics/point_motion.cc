@@ -11,14 +11,13 @@ constexpr size_t kMinRatios = 10;
 constexpr double kSideShare = 0.25;  // left and right of a person a box shows what is behind
 constexpr double kMaxGrowth = 1.1;   // from frame to frame
 
-// Not empty; the order of the values is lost.
+}  // namespace
+
 double Median(std::vector<double>* values) {
   const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
   std::nth_element(values->begin(), middle, values->end());
   return *middle;
 }
-
-}  // namespace
 
 std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> motions) {
   const Box core{box.x + kSideShare * box.width, box.y, (1 - 2 * kSideShare) * box.width, box.height};

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -19,6 +20,9 @@ struct BoxMotion {
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
   double scale = 1;
 };
+
+// The value in the middle; not empty, and their order is lost.
+double Median(std::vector<double>* values);
 
 // The motion of the object that fills most of the box, from the points in its middle: medians, which bear
 // that almost half of them belong to something else. Nothing when there are too few points.

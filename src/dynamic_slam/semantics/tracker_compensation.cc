@@ -13,23 +13,51 @@ namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kOtherClassIou = 0.6;     // a detection of another class must overlap by this
+constexpr double kLowScoreIou = 0.5;       // and one with a low score by this: many are parts of something
 constexpr double kBorder = 0.01;           // of the image's size: a box so near to the border is cut by it
 constexpr double kMinVisibleShare = 0.25;  // of a predicted box in the image
 constexpr double kHiddenShare = 0.5;       // of a box behind another one
-constexpr double kScoreLimit = 0.95;       // no single detection is surer than this
+constexpr double kCoveredShare = 0.3;  // of a box below another detection: what is seen of it may be a part
+constexpr double kDoubtfulNoise = 4;   // times the noise of a box that may be a part
+constexpr double kScoreLimit = 0.95;   // no single detection is surer than this
 constexpr double kMaxStep_s = 1.0;
+constexpr int kEstablishedFrames = 10;  // an object seen for so long goes on existing behind another one
+
+// Seen for long before it was missed.
+bool IsEstablished(const BoxTrack& track) {
+  return track.age_frames - track.missed_frames >= kEstablishedFrames;
+}
 
 double Logit(double probability) { return std::log(probability / (1 - probability)); }
 
 // How the neighbourhood of a pixel moves when the camera turns.
-struct ImageMotion {
+struct Turn {
   Eigen::Vector2d shift_px;
   Eigen::Matrix2d jacobian;
 };
 
+// How the points outside the boxes move, px; nothing when there are too few.
+std::optional<Eigen::Vector2d> BackgroundMotion(const std::vector<BoxTrack>& tracks,
+                                                std::span<const PointMotion> motions) {
+  constexpr size_t kMinPoints = 20;
+  std::vector<Box> boxes;
+  for (const BoxTrack& track : tracks) boxes.push_back(track.filter.box());
+  std::vector<double> dx, dy;
+  for (const PointMotion& motion : motions) {
+    const bool is_on_object = std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
+      return box.Contains(motion.from_px.x(), motion.from_px.y());
+    });
+    if (is_on_object || !motion.to_px.allFinite()) continue;
+    dx.push_back(motion.to_px.x() - motion.from_px.x());
+    dy.push_back(motion.to_px.y() - motion.from_px.y());
+  }
+  if (dx.size() < kMinPoints) return std::nullopt;
+  return Eigen::Vector2d(Median(&dx), Median(&dy));
+}
+
 // Nothing when the pixel turns out of view.
-std::optional<ImageMotion> RotateImage(const Camera& camera, const Eigen::Quaterniond& cam_from_last,
-                                       const Eigen::Vector2d& at_px) {
+std::optional<Turn> RotateImage(const Camera& camera, const Eigen::Quaterniond& cam_from_last,
+                                const Eigen::Vector2d& at_px) {
   // The lens model holds inside the image only: what is outside moves as its nearest pixel inside.
   const Eigen::Vector2d from = at_px.cwiseMax(0).cwiseMin(Eigen::Vector2d(camera.width, camera.height));
   Eigen::Matrix<double, 2, 3> moved;
@@ -40,7 +68,7 @@ std::optional<ImageMotion> RotateImage(const Camera& camera, const Eigen::Quater
     if (ray.z() < 0.1) return std::nullopt;
     moved.col(i) = camera.Distort(camera.Project(ray));
   }
-  ImageMotion motion{moved.col(0) - from, {}};
+  Turn motion{moved.col(0) - from, {}};
   motion.jacobian << moved.col(1) - moved.col(0), moved.col(2) - moved.col(0);
   if (!motion.shift_px.allFinite() || !motion.jacobian.allFinite()) return std::nullopt;
   return motion;
@@ -80,25 +108,38 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
   double elapsed_s = input.timestamp_s - state->timestamp_s;
   if (!(elapsed_s > 0)) elapsed_s = 1 / (camera_.fps > 0 ? camera_.fps : 30);
   state->timestamp_s = input.timestamp_s;
-  for (BoxTrack& track : state->tracks) {
+  std::optional<Eigen::Vector2d> background_px;
+  if (!input.cam_from_last) background_px = BackgroundMotion(state->tracks, input.motions);
+  const std::vector<BoxTrack> before = state->tracks;
+  for (size_t t = 0; t < before.size(); ++t) {
+    BoxTrack& track = state->tracks[t];
     track.is_detected = false;
     track.unseen_s += elapsed_s;
     ++track.age_frames;
     ++track.missed_frames;
     const double step_s = std::min(elapsed_s, kMaxStep_s);
-    if (const auto seen = MotionOfBox(track.filter.box(), input.motions)) {  // the camera's part included
-      track.filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale);
-      continue;
-    }
-    track.filter.Predict(options_.filter, step_s);
-    if (!input.cam_from_last) continue;
     const Box box = track.filter.box();
-    const std::optional<ImageMotion> motion =
-        RotateImage(camera_, *input.cam_from_last, {box.CenterX(), box.CenterY()});
-    if (motion) {
-      track.filter.Move(motion->shift_px, motion->jacobian);
+    // How the image moves there because the camera does.
+    Turn camera{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
+    if (input.cam_from_last) {
+      const std::optional<Turn> turn =
+          RotateImage(camera_, *input.cam_from_last, {box.CenterX(), box.CenterY()});
+      if (turn) {
+        camera = *turn;
+      } else {
+        track.unseen_s = kNever;
+      }
+    } else if (background_px) {
+      camera.shift_px = *background_px;
+    }
+    // The points in the box of something hidden are on what is in front of it.
+    std::optional<BoxMotion> seen;
+    if (before[t].is_detected || !IsHidden(before[t], before)) seen = MotionOfBox(box, input.motions);
+    if (seen) {
+      track.filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale, camera.shift_px);
     } else {
-      track.unseen_s = kNever;
+      track.filter.Predict(options_.filter, step_s);
+      track.filter.Move(camera.shift_px, camera.jacobian);
     }
   }
 }
@@ -107,6 +148,7 @@ double TrackerCompensation::Cost(const BoxTrack& track, const Detection& detecti
   if ((track.ClassId() == detection.class_id) != same_class) return kNever;
   const Box predicted = track.filter.box();
   const double iou = IoU(ClipToImage(predicted, camera_), detection.box);
+  if (detection.score < options_.high_score && iou < kLowScoreIou) return kNever;
   if (!same_class) return iou >= kOtherClassIou ? 1 - iou : kNever;
   // Distance decides between boxes that the prediction does not reach.
   const double distance =
@@ -139,7 +181,7 @@ std::vector<Detection> TrackerCompensation::Match(const std::vector<Detection>& 
       if (column_of[r] < 0) continue;
       const size_t d = columns[column_of[r]];
       is_used[d] = true;
-      See(detections[d], &tracks[rows[r]]);
+      See(detections[d], detections, &tracks[rows[r]]);
     }
   };
   const auto is_high = [&](const Detection& d) { return d.score >= options_.high_score; };
@@ -148,8 +190,10 @@ std::vector<Detection> TrackerCompensation::Match(const std::vector<Detection>& 
   assign(is_high, false);
 
   for (BoxTrack& track : tracks) {
-    // What stands behind something else cannot be seen, which says nothing against it.
-    if (!track.is_detected && !IsHidden(track, tracks)) track.evidence -= options_.miss_evidence;
+    if (track.is_detected) continue;
+    // What stands behind something else cannot be seen, which says little against it.
+    const bool is_hidden = IsEstablished(track) && IsHidden(track, tracks);
+    track.evidence -= is_hidden ? options_.hidden_evidence : options_.miss_evidence;
   }
   std::vector<Detection> left;
   for (size_t d = 0; d < detections.size(); ++d) {
@@ -158,9 +202,16 @@ std::vector<Detection> TrackerCompensation::Match(const std::vector<Detection>& 
   return left;
 }
 
-void TrackerCompensation::See(const Detection& detection, BoxTrack* track) const {
-  const Box measured = Completed(detection.box, track->filter.box());
-  track->filter.Update(options_.filter, measured);
+void TrackerCompensation::See(const Detection& detection, const std::vector<Detection>& all,
+                              BoxTrack* track) const {
+  const Box predicted = track->filter.box();
+  const bool is_covered = std::any_of(all.begin(), all.end(), [&](const Detection& other) {
+    return &other != &detection && other.score >= options_.high_score &&
+           IntersectionArea(predicted, other.box) > kCoveredShare * predicted.Area();
+  });
+  const bool is_doubtful = is_covered || detection.score < options_.high_score;
+  track->filter.Update(options_.filter, Completed(detection.box, predicted),
+                       is_doubtful ? kDoubtfulNoise : 1);
   const auto vote = std::find_if(track->class_votes.begin(), track->class_votes.end(),
                                  [&](const auto& v) { return v.first == detection.class_id; });
   if (vote == track->class_votes.end()) {
@@ -168,10 +219,12 @@ void TrackerCompensation::See(const Detection& detection, BoxTrack* track) const
   } else {
     vote->second += detection.score;
   }
+  // What is seen of a covered object may be a part with a low score, which says no more than not to see it.
+  double gain = Evidence(detection.score);
+  if (is_covered && IsEstablished(*track)) gain = std::max(gain, -options_.hidden_evidence);
   // A detection that would begin an object does not end one.
-  const double least =
-      detection.score >= options_.high_score ? std::max(Evidence(detection.score), 0.0) : -kNever;
-  track->evidence = std::clamp(track->evidence + Evidence(detection.score), least, options_.max_evidence);
+  const double least = detection.score >= options_.high_score ? std::max(gain, 0.0) : -kNever;
+  track->evidence = std::clamp(track->evidence + gain, least, options_.max_evidence);
   track->seen = detection;
   track->is_detected = true;
   track->unseen_s = 0;
@@ -223,7 +276,6 @@ bool TrackerCompensation::IsHidden(const BoxTrack& track, const std::vector<BoxT
 std::vector<CompensatedBox> TrackerCompensation::BoxesOf(const TrackerState& state) const {
   std::vector<CompensatedBox> boxes;
   for (const BoxTrack& track : state.tracks) {
-    if (!track.is_detected && IsHidden(track, state.tracks)) continue;
     const Box box = ClipToImage(track.filter.box(), camera_);
     boxes.push_back({box, track.ClassId(), 1 / (1 + std::exp(-track.evidence)), track.id, track.is_detected,
                      track.age_frames, track.missed_frames});

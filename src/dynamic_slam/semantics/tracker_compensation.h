@@ -10,11 +10,12 @@
 namespace dynamic_slam {
 
 struct TrackerCompensationOptions {
-  double low_score = 0.1;
+  double low_score = 0.3;
   double high_score = 0.4;
   double neutral_score = 0.45;
   double max_evidence = 6.0;
-  double miss_evidence = 1.0;
+  double miss_evidence = 1.5;
+  double hidden_evidence = 0.2;
   double max_unseen_s = 1.0;
   double min_iou = 0.3;
   double max_duplicate_iou = 0.7;
@@ -34,6 +35,8 @@ struct TrackerCompensationOptions {
           OptionField{"", 0, 20, "Log-odds grow no further; over miss_evidence, the misses one outlives."});
     visit("miss_evidence", self.miss_evidence,
           OptionField{"", 0.01, 20, "What a result without the object takes off its log-odds."});
+    visit("hidden_evidence", self.hidden_evidence,
+          OptionField{"", 0.01, 20, "The same of an object that is behind another one."});
     visit("max_unseen_s", self.max_unseen_s,
           OptionField{"s", 0, 10, "An object is given up when it was not seen for longer."});
     visit("min_iou", self.min_iou,
@@ -78,6 +81,10 @@ struct TrackerState {
 // - Evidence is log-odds: a detection adds logit(score) - logit(neutral_score), a result without the object
 //   takes miss_evidence. So a box is held the longer, the longer and the better it was seen. A frame without
 //   a result says nothing against an object.
+// - An object behind another one is still there: not to see it takes hidden_evidence only, it moves on with
+// its
+//   own velocity and the background's instead of the points in front of it, and what is detected of it, which
+//   may be a part, counts less.
 class TrackerCompensation : public ReplayingCompensation<TrackerState> {
  public:
   TrackerCompensation(const TrackerCompensationOptions& options, const Camera& camera);
@@ -92,7 +99,8 @@ class TrackerCompensation : public ReplayingCompensation<TrackerState> {
   // Gives detections to tracks; returns those that are left.
   std::vector<Detection> Match(const std::vector<Detection>& detections, TrackerState* state) const;
   void Begin(const Detection& detection, TrackerState* state);
-  void See(const Detection& detection, BoxTrack* track) const;
+  // `all` are the detections of the frame.
+  void See(const Detection& detection, const std::vector<Detection>& all, BoxTrack* track) const;
   bool IsOver(const BoxTrack& track) const;
   // log-odds that a detection adds.
   double Evidence(double score) const;

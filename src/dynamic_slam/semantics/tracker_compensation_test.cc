@@ -52,11 +52,11 @@ TEST_F(TrackerCompensationTest, PredictsThroughMisses) {
 
 TEST(TrackerCompensation, HoldsABoxTheLongerTheLongerAndBetterItWasSeen) {
   EXPECT_EQ(HeldFrames(1, 0.41), 0);
-  // Log-odds of 0.8 over those of 0.45 are 1.59 a frame, at most 6; a miss takes 1.
+  // Log-odds of 0.8 over those of 0.45 are 1.59 a frame, at most 6; a miss takes 1.5.
   EXPECT_EQ(HeldFrames(1, 0.8), 1);
-  EXPECT_EQ(HeldFrames(2, 0.8), 3);
-  EXPECT_EQ(HeldFrames(100, 0.8), 5);
-  EXPECT_EQ(HeldFrames(100, 0.95), 5);
+  EXPECT_EQ(HeldFrames(2, 0.8), 2);
+  EXPECT_EQ(HeldFrames(100, 0.8), 3);
+  EXPECT_EQ(HeldFrames(100, 0.95), 3);
 }
 
 TEST_F(TrackerCompensationTest, NoResultIsNoEvidenceButLifeIsBounded) {
@@ -177,6 +177,54 @@ TEST_F(TrackerCompensationTest, FollowsThePointsInABox) {
   ASSERT_THAT(boxes, SizeIs(1));
   EXPECT_NEAR(boxes[0].box.x, 213, 1e-6);
   EXPECT_NEAR(boxes[0].box.y, 93, 1e-6);
+}
+
+// Someone who has been seen for 12 frames at (240, 100), and someone at (205, 90) in front.
+std::vector<Detection> TwoPeople() { return {At(240, 100), At(205, 90)}; }
+
+TEST_F(TrackerCompensationTest, SomeoneBehindSomeoneIsStillThere) {
+  for (int i = 0; i < 12; ++i) feed_.See(TwoPeople());
+  for (int i = 0; i < 20; ++i) {
+    const auto boxes = feed_.See({{At(205, 90)}});
+    ASSERT_THAT(boxes, SizeIs(2)) << i;
+    EXPECT_FALSE(boxes[0].is_detected && boxes[1].is_detected);
+  }
+  // Not for ever, and what was seen for a moment only is given up at once.
+  for (int i = 0; i < 20; ++i) feed_.See({{At(205, 90)}});
+  EXPECT_THAT(tracker_.Boxes(), SizeIs(1));
+}
+
+TEST_F(TrackerCompensationTest, WhatIsHiddenDoesNotFollowThePointsInFrontOfIt) {
+  for (int i = 0; i < 12; ++i) feed_.See(TwoPeople());
+  // The one in front goes left by 3 px a frame; the background rests.
+  for (int i = 1; i <= 5; ++i) {
+    const double left = 205 - 3 * i;
+    std::vector<PointMotion> motions;
+    for (double x = left; x < left + 100; x += 8) {
+      for (double y = 100; y < 280; y += 12) motions.push_back({{x + 3, y}, {x, y}});
+    }
+    for (double x = 400; x < 600; x += 20) {
+      for (double y = 20; y < 460; y += 40) motions.push_back({{x, y}, {x, y}});
+    }
+    feed_.See({{At(left, 90)}}, std::nullopt, motions);
+  }
+  const auto boxes = tracker_.Boxes();
+  ASSERT_THAT(boxes, SizeIs(2));
+  const size_t hidden = boxes[0].is_detected ? 1 : 0;
+  EXPECT_NEAR(boxes[hidden].box.x, 240, 6);
+  EXPECT_NEAR(boxes[1 - hidden].box.x, 190, 4);
+}
+
+TEST_F(TrackerCompensationTest, AnUnseenBoxRidesOnTheBackground) {
+  for (int i = 0; i < 3; ++i) feed_.See({{At(200, 100)}});
+  std::vector<PointMotion> motions;
+  for (double x = 400; x < 600; x += 20) {
+    for (double y = 20; y < 460; y += 40) motions.push_back({{x, y}, {x + 9, y - 2}});
+  }
+  const auto boxes = feed_.See(std::nullopt, std::nullopt, motions);
+  ASSERT_THAT(boxes, SizeIs(1));
+  EXPECT_NEAR(boxes[0].box.x, 209, 1e-6);
+  EXPECT_NEAR(boxes[0].box.y, 98, 1e-6);
 }
 
 TEST_F(TrackerCompensationTest, LateResultsAreAsGoodAsThoseInTime) {
