@@ -9,6 +9,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/point_cloud_file.h"
 #include "dynamic_slam/io/trajectory_file.h"
 
@@ -80,19 +81,6 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   return json;
 }
 
-void WriteText(const std::filesystem::path& file, const std::string& text) {
-  const std::filesystem::path temporary = file.string() + ".tmp";
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << text;
-  stream.close();
-  std::error_code error;
-  if (stream) std::filesystem::rename(temporary, file, error);
-  if (!stream || error) {
-    throw InputError(file.string(), "cannot be written",
-                     "Choose another folder with --out, or free some space.");
-  }
-}
-
 std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
   std::string csv = "timestamp,state,keypoints,inliers,keyframe,detection,objects,tracking_ms,reason\n";
   for (const RunSummary::FrameRecord& frame : frames) {
@@ -149,14 +137,15 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
     for (const StampedPose& pose : trajectory) poses.push_back(pose.world_from_cam);
     WriteKittiPoses(kitti, poses);
   }
-  WriteText(folder / "frames.csv", FramesCsv(summary.frames));
+  WriteFileAtomically(folder / "frames.csv", FramesCsv(summary.frames));
   std::vector<Eigen::Vector3f> points;
   system.map().Read()->landmarks().ForEach(
       [&points](const Landmark& landmark) { points.push_back(landmark.position().cast<float>()); });
   WritePly(folder / "map.ply", points);
-  WriteText(folder / "config.yaml", OptionsToYaml(system.options()));
-  WriteText(folder / "summary.json",
-            ToJson(summary).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  WriteFileAtomically(folder / "config.yaml", OptionsToYaml(system.options()));
+  WriteFileAtomically(
+      folder / "summary.json",
+      ToJson(summary).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace dynamic_slam
