@@ -27,6 +27,7 @@
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/io/image_preparer.h"
 #include "run_console.h"
+#include "source_arguments.h"
 
 namespace dynamic_slam {
 namespace {
@@ -219,12 +220,7 @@ void AddDetectCommand(CLI::App& app, int* exit_code) {
   command->add_option("--every", a.every, "Only each n-th image")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--start", a.source_options.start, "Frames to skip first")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--max-frames", a.source_options.max_frames, "Frames to read at most (0: all)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--fps", a.source_options.fps, "Frames a second of a folder of images (30) or a video")
-      ->check(CLI::NonNegativeNumber);
+  AddSourceOptions(command, &a.source_options);
   command->add_flag("--quiet", a.quiet, "No progress line");
   command->footer(
       "Examples:\n"

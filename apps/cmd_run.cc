@@ -20,6 +20,7 @@
 #include "dynamic_slam/system/slam_system.h"
 #include "overlay_writer.h"
 #include "run_console.h"
+#include "source_arguments.h"
 #include "truth_report.h"
 
 namespace dynamic_slam {
@@ -147,12 +148,7 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
   command->add_option("--trace", a.trace,
                       "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
-  command->add_option("--start", a.source_options.start, "Frames to skip first")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--max-frames", a.source_options.max_frames, "Frames to run at most (0: all)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--fps", a.source_options.fps, "Frames a second of a folder of images (30) or a video")
-      ->check(CLI::NonNegativeNumber);
+  AddSourceOptions(command, &a.source_options);
   command->add_flag("--quiet", a.quiet, "No progress line");
   command->footer(
       "Examples:\n"
