@@ -17,6 +17,9 @@ struct Frame {
   KeypointGrid grid;
   std::vector<LandmarkId> landmarks;    // of each keypoint; not valid where there is none
   std::vector<Eigen::Vector3d> points;  // where that landmark was in the world when it was matched
+  std::vector<float> static_log_odds;   // of that landmark, when it was matched
+  // P(at rest) of what each keypoint shows, before anything is known of its landmark; 0: not to be used.
+  std::vector<float> static_probability;
   Rigid3 cam_from_world;
   KeyframeId reference;       // the keyframe that shares most landmarks with it
   Rigid3 cam_from_reference;  // outlives changes of the map, which cam_from_world does not
@@ -24,6 +27,7 @@ struct Frame {
   void ClearLandmarks() {
     landmarks.assign(features.size(), LandmarkId());
     points.resize(features.size());
+    static_log_odds.resize(features.size());
   }
 };
 

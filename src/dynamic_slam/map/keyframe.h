@@ -16,17 +16,21 @@ struct CovisibleKeyframe {
   int weight = 0;
 };
 
+// No landmark is made of a keypoint whose P(at rest) is below this, and it takes no part in the start.
+inline constexpr float kMinStaticProbability = 0.5f;
+
 // An image that stays in the map. Its links to landmarks and other keyframes are made by Map alone.
 class Keyframe {
  public:
   Keyframe(KeyframeId id, FrameId frame_id, double timestamp_s, const Rigid3& cam_from_world,
-           FeatureSet features, KeypointGrid grid)
+           FeatureSet features, KeypointGrid grid, std::vector<float> static_probability = {})
       : id_(id),
         frame_id_(frame_id),
         timestamp_s_(timestamp_s),
         cam_from_world_(cam_from_world),
         features_(std::move(features)),
         grid_(std::move(grid)),
+        static_probability_(std::move(static_probability)),
         landmarks_(features_.size()) {}
 
   KeyframeId id() const { return id_; }
@@ -40,6 +44,11 @@ class Keyframe {
   const FeatureSet& features() const { return features_; }
   const Keypoint& keypoint(uint32_t index) const { return features_.keypoints[index]; }
   const KeypointGrid& grid() const { return grid_; }
+
+  // P(at rest) of what a keypoint shows, as Frame has it; 1 where nothing was said.
+  float StaticProbability(uint32_t index) const {
+    return static_probability_.empty() ? 1.0f : static_probability_[index];
+  }
 
   // The landmark of each keypoint; not valid where there is none.
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
@@ -61,6 +70,7 @@ class Keyframe {
   Rigid3 cam_from_world_;
   FeatureSet features_;
   KeypointGrid grid_;
+  std::vector<float> static_probability_;
   std::vector<LandmarkId> landmarks_;
   int landmark_count_ = 0;
   std::vector<CovisibleKeyframe> covisible_;

@@ -42,6 +42,9 @@ class Landmark {
   // How often tracking expected to see it, and found it.
   int visible_count = 1;
   int found_count = 1;
+  // Log of P(at rest) / P(moves), from all frames that matched it (tracking/dynamic_filter.h).
+  float static_log_odds = 0;
+
   double FoundRatio() const { return static_cast<double>(found_count) / visible_count; }
 
  private:

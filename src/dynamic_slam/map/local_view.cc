@@ -18,6 +18,7 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
   view->min_distances.clear();
   view->max_distances.clear();
   view->descriptors.clear();
+  view->static_log_odds.clear();
   view->reference = KeyframeId();
 
   votes_.assign(map.keyframes().CreatedCount(), 0);
@@ -65,6 +66,7 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
       view->min_distances.push_back(landmark.min_distance());
       view->max_distances.push_back(landmark.max_distance());
       view->descriptors.push_back(landmark.descriptor());
+      view->static_log_odds.push_back(landmark.static_log_odds);
     }
   }
 }

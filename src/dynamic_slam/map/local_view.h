@@ -19,6 +19,7 @@ struct LocalView {
   std::vector<Eigen::Vector3f> normals;
   std::vector<float> min_distances, max_distances;
   std::vector<Descriptor> descriptors;
+  std::vector<float> static_log_odds;
   KeyframeId reference;         // the keyframe that shares most landmarks with the frame
   Rigid3 reference_from_world;  // where it was when the view was made: the map goes on changing
 

@@ -25,8 +25,9 @@ class Map {
   uint32_t epoch() const { return epoch_; }
 
   Keyframe& AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world, FeatureSet features,
-                        KeypointGrid grid) {
-    return keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features), std::move(grid));
+                        KeypointGrid grid, std::vector<float> static_probability = {}) {
+    return keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features), std::move(grid),
+                              std::move(static_probability));
   }
 
   Landmark& AddLandmark(const Eigen::Vector3d& position, KeyframeId created_by) {

@@ -31,7 +31,7 @@ struct FreeKeypoints {
 FreeKeypoints CollectFree(const Keyframe& keyframe, const std::vector<float>& scales) {
   FreeKeypoints free;
   for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
-    if (keyframe.landmarks()[i].IsValid()) continue;
+    if (keyframe.landmarks()[i].IsValid() || keyframe.StaticProbability(i) < kMinStaticProbability) continue;
     const Keypoint& keypoint = keyframe.keypoint(i);
     free.indices.push_back(i);
     free.x.push_back(keypoint.x);

@@ -29,7 +29,7 @@ FusionCount LandmarkFusion::FuseInto(KeyframeId target_id, const std::vector<Lan
                               projection.octave + 1};
     const WindowMatch match =
         FindInWindow(target.features(), target.grid(), window, landmark->descriptor(), {});
-    if (match.distance > kStrictDistance) continue;
+    if (match.distance > kStrictDistance || !(target.StaticProbability(match.keypoint) > 0)) continue;
     const Keypoint& keypoint = target.keypoint(match.keypoint);
     const double sigma = map->octave_scales()[static_cast<size_t>(keypoint.octave)];
     if ((Eigen::Vector2d(keypoint.x, keypoint.y) - projection.px).squaredNorm() > kChi2TwoDof * sigma * sigma)

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <string>
+
 #include "dynamic_slam/base/option_field.h"
+#include "dynamic_slam/semantics/dynamic_score.h"
 #include "dynamic_slam/semantics/make_compensation.h"
 
 namespace dynamic_slam {
@@ -10,6 +13,8 @@ struct DetectionOptions {
   double deadline_ms = 5;
   double latency_ms = 0;
   CompensationOptions compensation;
+  std::string prior = "dynamic_prior";
+  DynamicScoreOptions score;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
@@ -23,6 +28,9 @@ struct DetectionOptions {
           OptionField{"ms", 0, 60000,
                       "Answers are kept back until the stamps are so much later: a simulated slow network."});
     visit("compensation", self.compensation);
+    visit("prior", self.prior,
+          OptionField{"", 0, 0, "File, or name of one in the configuration, with the scores of classes."});
+    visit("score", self.score);
   }
 };
 

@@ -5,6 +5,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/semantics/dynamic_prior.h"
 
 namespace dynamic_slam {
 namespace {
@@ -35,6 +36,7 @@ DetectionStage::DetectionStage(std::shared_ptr<Detector> detector, const Detecti
       options_(options),
       executor_(executor),
       compensation_(MakeBoxCompensation(options.compensation, camera)),
+      score_(options.score, ClassScores(LoadDynamicPrior(options.prior), detector_->class_names())),
       shared_(std::make_shared<Shared>()) {}
 
 bool DetectionStage::Begin(FrameId frame, double timestamp_s) {
@@ -107,7 +109,7 @@ FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
     objects.state = DetectionState::kFailed;
     objects.reason = failure_;
   }
-  objects.boxes = compensation_->Update(input);
+  objects.boxes = score_.Update(compensation_->Update(input));
   return objects;
 }
 
@@ -117,6 +119,7 @@ void DetectionStage::SetRotation(FrameId frame, const Eigen::Quaterniond& cam_fr
 
 void DetectionStage::Reset() {
   compensation_->Reset();
+  score_.Reset();
   shared_ = std::make_shared<Shared>();
   open_.reset();
   answer_.reset();

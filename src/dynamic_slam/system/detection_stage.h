@@ -13,6 +13,7 @@
 #include "dynamic_slam/semantics/box_compensation.h"
 #include "dynamic_slam/semantics/detection_exchange.h"
 #include "dynamic_slam/semantics/detector.h"
+#include "dynamic_slam/semantics/dynamic_score.h"
 #include "dynamic_slam/system/detection_options.h"
 #include "dynamic_slam/system/executor.h"
 
@@ -32,7 +33,7 @@ const char* Name(DetectionState state);
 struct FrameObjects {
   DetectionState state = DetectionState::kOff;
   std::string reason;  // of a failure
-  std::vector<CompensatedBox> boxes;
+  std::vector<DynamicBox> boxes;
 };
 
 // What the detector has done so far.
@@ -90,6 +91,7 @@ class DetectionStage {
   DetectionOptions options_;
   Executor* executor_;
   std::unique_ptr<BoxCompensation> compensation_;
+  DynamicScore score_;
   std::shared_ptr<Shared> shared_;
   std::optional<Question> open_;
   std::optional<DetectionResult> answer_;  // that came before it was due

@@ -34,7 +34,7 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       preparer_(raw_camera, options.image),
       mode_(mode),
       map_(OctaveScales(options.orb)),
-      tracker_(camera(), options.orb, options.tracker, options.seed, &map_),
+      tracker_(camera(), options.orb, options.tracker, options.dynamic, options.seed, &map_),
       mapper_(camera(), options.mapper, &map_),
       executor_(std::move(executor)) {}
 
@@ -61,7 +61,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   if (detection_.has_value()) {
     result.objects = detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation());
   }
-  result.tracking = tracker_.Track(executor_->Waiting(Lane::kMapping));
+  result.tracking = tracker_.Track(result.objects.boxes, executor_->Waiting(Lane::kMapping));
   if (const auto rotation = tracker_.Rotation(); rotation.has_value() && detection_.has_value()) {
     detection_->SetRotation(result.id, *rotation);
   }

@@ -7,6 +7,7 @@
 #include "dynamic_slam/io/image_options.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/system/detection_options.h"
+#include "dynamic_slam/tracking/dynamic_options.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 
 namespace dynamic_slam {
@@ -19,6 +20,7 @@ struct SystemOptions {
   OrbOptions orb;
   TrackerOptions tracker;
   MapperOptions mapper;
+  DynamicOptions dynamic;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
@@ -28,6 +30,7 @@ struct SystemOptions {
           OptionField{"", 0, 1, "Adjust the whole map once more when the sequence is over."});
     visit("image", self.image);
     visit("detector", self.detector);
+    visit("dynamic", self.dynamic);
     visit("orb", self.orb);
     visit("tracker", self.tracker);
     visit("mapper", self.mapper);

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "dynamic_slam/tracking/dynamic_filter.h"
+
 namespace dynamic_slam {
 namespace {
 
@@ -56,13 +59,16 @@ std::vector<Match> Initializer::MatchWithReference(const Frame& frame) {
     int distance = 257;
   };
   std::vector<Taker> takers(frame.features.size());
+  // What may move takes no part (section 4.3).
+  std::vector<uint8_t> moves(frame.features.size());
+  for (size_t i = 0; i < moves.size(); ++i) moves[i] = frame.static_probability[i] < kMinStaticProbability;
   for (uint32_t i = 0; i < first.size(); ++i) {
     const int octave = first.keypoints[i].octave;
-    if (octave > options_.max_octave) continue;
+    if (octave > options_.max_octave || reference_->static_probability[i] < kMinStaticProbability) continue;
     const SearchWindow window{last_places_[i].x(), last_places_[i].y(),
                               static_cast<float>(options_.search_radius_px), std::max(0, octave - 1),
                               std::min(octave + 1, options_.max_octave)};
-    const WindowMatch match = FindInWindow(frame.features, frame.grid, window, first.descriptors[i], {});
+    const WindowMatch match = FindInWindow(frame.features, frame.grid, window, first.descriptors[i], moves);
     if (match.distance > kStrictDistance || match.distance > kMatchRatio * match.second_distance) continue;
     if (match.distance < takers[match.keypoint].distance) takers[match.keypoint] = {i, match.distance};
   }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dynamic_slam/tracking/dynamic_filter.h"
+
 namespace dynamic_slam {
 namespace {
 
@@ -22,7 +24,7 @@ PoseTracker::PoseTracker(const Camera& camera, const TrackerOptions& options,
 int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_from_world, double radius_px,
                                 Frame* frame) {
   frame->ClearLandmarks();
-  taken_.assign(frame->features.size(), 0);
+  TakeUnusable(*frame);
   candidates_.clear();
   rotation_.Clear();
   const Eigen::Matrix3d rotation = predicted_cam_from_world.Matrix();
@@ -41,7 +43,7 @@ int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_f
         FindInWindow(frame->features, frame->grid, window, last.features.descriptors[i], taken_);
     if (match.distance > kLooseDistance) continue;
     taken_[match.keypoint] = 1;
-    candidates_.push_back({match.keypoint, last.landmarks[i], last.points[i]});
+    candidates_.push_back({match.keypoint, last.landmarks[i], last.points[i], last.static_log_odds[i]});
     rotation_.Add(last_keypoint.angle_rad, frame->features.keypoints[match.keypoint].angle_rad);
   }
   AcceptCandidates(frame);
@@ -50,18 +52,21 @@ int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_f
 
 int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Random& random, Frame* frame) {
   frame->ClearLandmarks();
-  std::vector<uint32_t> with_landmark, all(frame->features.size());
+  std::vector<uint32_t> with_landmark, usable;
   for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
     if (keyframe.landmarks()[i].IsValid()) with_landmark.push_back(i);
   }
-  for (uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  const std::vector<Match> matches = MatchMutual(keyframe.features(), with_landmark, frame->features, all,
+  for (uint32_t i = 0; i < frame->features.size(); ++i) {
+    if (frame->static_probability[i] > 0) usable.push_back(i);
+  }
+  const std::vector<Match> matches = MatchMutual(keyframe.features(), with_landmark, frame->features, usable,
                                                  (kStrictDistance + kLooseDistance) / 2, kKeyframeRatio);
   candidates_.clear();
   rotation_.Clear();
   for (const Match& match : matches) {
     const LandmarkId landmark = keyframe.landmarks()[match.first];
-    candidates_.push_back({match.second, landmark, map.landmarks().At(landmark).position()});
+    const Landmark& known = map.landmarks().At(landmark);
+    candidates_.push_back({match.second, landmark, known.position(), known.static_log_odds});
     rotation_.Add(keyframe.keypoint(match.first).angle_rad,
                   frame->features.keypoints[match.second].angle_rad);
   }
@@ -90,7 +95,7 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
 int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* frame,
                                std::vector<uint8_t>* in_view) {
   in_view->assign(view.size(), 0);
-  taken_.assign(frame->features.size(), 0);
+  TakeUnusable(*frame);
   uint32_t max_id = 0;
   for (const LandmarkId id : view.ids) max_id = std::max(max_id, id.value());
   for (const LandmarkId id : frame->landmarks) {
@@ -123,6 +128,7 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
     taken_[match.keypoint] = 1;
     frame->landmarks[match.keypoint] = view.ids[i];
     frame->points[match.keypoint] = view.positions[i];
+    frame->static_log_odds[match.keypoint] = view.static_log_odds[i];
   }
   return OptimisePose(frame->cam_from_world, frame);
 }
@@ -134,16 +140,25 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     if (!frame->landmarks[i].IsValid()) continue;
     const Keypoint& keypoint = frame->features.keypoints[i];
     observations_.Add(frame->points[i], {keypoint.x, keypoint.y},
-                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)]);
+                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)],
+                      TrustInMatch(frame->static_probability[i], frame->static_log_odds[i]));
     observed_keypoints_.push_back(i);
   }
+  rejected_.clear();
   optimizer_.Optimize(observations_, initial_cam_from_world, &estimate_);
   if (!estimate_.converged) return 0;
   frame->cam_from_world = estimate_.cam_from_world;
   for (size_t i = 0; i < observed_keypoints_.size(); ++i) {
-    if (estimate_.is_inlier[i] == 0) frame->landmarks[observed_keypoints_[i]] = LandmarkId();
+    if (estimate_.is_inlier[i] != 0) continue;
+    rejected_.push_back(frame->landmarks[observed_keypoints_[i]]);
+    frame->landmarks[observed_keypoints_[i]] = LandmarkId();
   }
   return estimate_.inliers;
+}
+
+void PoseTracker::TakeUnusable(const Frame& frame) {
+  taken_.resize(frame.features.size());
+  for (size_t i = 0; i < taken_.size(); ++i) taken_[i] = !(frame.static_probability[i] > 0);
 }
 
 void PoseTracker::AcceptCandidates(Frame* frame) {
@@ -152,6 +167,7 @@ void PoseTracker::AcceptCandidates(Frame* frame) {
     if (keep[i] == 0) continue;
     frame->landmarks[candidates_[i].keypoint] = candidates_[i].landmark;
     frame->points[candidates_[i].keypoint] = candidates_[i].point;
+    frame->static_log_odds[candidates_[i].keypoint] = candidates_[i].static_log_odds;
   }
 }
 

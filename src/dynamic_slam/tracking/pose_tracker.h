@@ -32,6 +32,9 @@ class PoseTracker {
   // in_view[i] becomes 1 when entry i should be visible in the frame at its pose before this call.
   int TrackLocalMap(const LocalView& view, double radius_px, Frame* frame, std::vector<uint8_t>* in_view);
 
+  // Landmarks that were matched and did not fit the last pose that was found.
+  const std::vector<LandmarkId>& rejected() const { return rejected_; }
+
  private:
   // Optimises the pose over all the frame's landmarks from `initial`; takes away those that do not fit.
   int OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame);
@@ -41,8 +44,12 @@ class PoseTracker {
     uint32_t keypoint;
     LandmarkId landmark;
     Eigen::Vector3d point;
+    float static_log_odds;
   };
   void AcceptCandidates(Frame* frame);
+
+  // Keypoints that are not to be used count as taken.
+  void TakeUnusable(const Frame& frame);
 
   Camera camera_;
   TrackerOptions options_;
@@ -56,6 +63,7 @@ class PoseTracker {
   std::vector<uint32_t> observed_keypoints_;
   std::vector<Candidate> candidates_;
   std::vector<uint8_t> taken_;
+  std::vector<LandmarkId> rejected_;
   std::vector<uint8_t> landmark_known_;
   RotationConsistency rotation_;
 };

@@ -43,9 +43,10 @@ const char* Name(TrackingState state) {
   return "";
 }
 
-Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
-                 SharedMap* map)
-    : orb_options_(orb),
+Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options,
+                 const DynamicOptions& dynamic, uint64_t seed, SharedMap* map)
+    : camera_(camera),
+      orb_options_(orb),
       options_(options),
       map_(map),
       octave_scales_(map->Read()->octave_scales()),
@@ -53,6 +54,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       extractor_(orb, camera),
       initializer_(camera, options.initializer, octave_scales_),
       pose_tracker_(camera, options, octave_scales_),
+      filter_(dynamic),
       seed_(seed),
       random_(seed) {}
 
@@ -61,18 +63,26 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   frame_.id = id;
   frame_.timestamp_s = timestamp_s;
   const bool is_starting = state_ == TrackingState::kInitialising || !start_is_certain_;
-  const double factor = is_starting ? options_.initializer.feature_factor : 1.0;
+  double factor = is_starting ? options_.initializer.feature_factor : 1.0;
+  if (filter_.options().more_features) {
+    factor = std::max(factor, std::min(1 / (1 - share_in_boxes_), filter_.options().max_feature_factor));
+  }
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
   frame_.grid.Build(frame_.features, bounds_);
+  frame_.static_probability.assign(frame_.features.size(), 1.0f);
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
 }
 
-TrackingResult Tracker::Track(int keyframes_waiting) {
+TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting) {
   DS_TRACE("tracking");
   inliers_ = 0;
   reason_.clear();
+  const DynamicKeypoints judged = filter_.Judge(objects, &frame_);
+  share_in_boxes_ = frame_.features.size() == 0
+                        ? 0
+                        : static_cast<double>(judged.InBoxes()) / static_cast<double>(frame_.features.size());
 
   TrackingResult result;
   result.keypoints = static_cast<int>(frame_.features.size());
@@ -187,7 +197,10 @@ void Tracker::RefreshLastFrame() {
   for (size_t i = 0; i < last_.landmarks.size(); ++i) {
     if (!last_.landmarks[i].IsValid()) continue;
     last_.landmarks[i] = map->Resolve(last_.landmarks[i]);
-    if (last_.landmarks[i].IsValid()) last_.points[i] = map->landmarks().At(last_.landmarks[i]).position();
+    if (!last_.landmarks[i].IsValid()) continue;
+    const Landmark& landmark = map->landmarks().At(last_.landmarks[i]);
+    last_.points[i] = landmark.position();
+    last_.static_log_odds[i] = landmark.static_log_odds;
   }
 }
 
@@ -277,11 +290,20 @@ bool Tracker::Relocalise() {
 
 void Tracker::CountVisibility() {
   for (size_t i = 0; i < view_.size(); ++i) {
-    if (in_view_[i] != 0) visibility_.visible.push_back(view_.ids[i]);
+    if (in_view_[i] == 0) continue;
+    if (filter_.options().shield_hidden && filter_.HasBoxes()) {
+      const Eigen::Vector2d px = camera_.Distort(camera_.Project(frame_.cam_from_world * view_.positions[i]));
+      // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
+      if (filter_.IsInBox(px.x(), px.y())) continue;
+    }
+    visibility_.visible.push_back(view_.ids[i]);
   }
-  for (const LandmarkId id : frame_.landmarks) {
-    if (id.IsValid()) visibility_.found.push_back(id);
+  for (size_t i = 0; i < frame_.landmarks.size(); ++i) {
+    if (!frame_.landmarks[i].IsValid()) continue;
+    visibility_.found.push_back(frame_.landmarks[i]);
+    visibility_.Judge(frame_.landmarks[i], filter_.Evidence(frame_.static_probability[i], true));
   }
+  for (const LandmarkId id : pose_tracker_.rejected()) visibility_.Judge(id, filter_.Evidence(0.5f, false));
 }
 
 void VisibilityLog::ApplyTo(Map* map) {
@@ -295,6 +317,12 @@ void VisibilityLog::ApplyTo(Map* map) {
     ++landmark.found_count;
     // Also found where it was not expected.
     landmark.visible_count = std::max(landmark.visible_count, landmark.found_count);
+  }
+  for (const auto& [id, evidence] : static_evidence) {
+    const LandmarkId now = map->Resolve(id);
+    if (!now.IsValid()) continue;
+    float& odds = map->landmarks().At(now).static_log_odds;
+    odds = std::clamp(odds + evidence, -DynamicFilter::kMaxLogOdds, DynamicFilter::kMaxLogOdds);
   }
   Clear();
 }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -12,6 +14,7 @@
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/local_view.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/tracking/dynamic_filter.h"
 #include "dynamic_slam/tracking/initializer.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
 #include "dynamic_slam/tracking/pose_tracker.h"
@@ -43,11 +46,17 @@ struct TrackingResult {
 // Which landmarks were to be seen in frames, and which were found; the map is told with the next keyframe.
 struct VisibilityLog {
   std::vector<LandmarkId> visible, found;
+  std::vector<std::pair<LandmarkId, float>> static_evidence;  // to be added to the log-odds
+
+  void Judge(LandmarkId id, float evidence) {
+    if (evidence != 0) static_evidence.emplace_back(id, evidence);
+  }
 
   void ApplyTo(Map* map);  // and empties itself
   void Clear() {
     visible.clear();
     found.clear();
+    static_evidence.clear();
   }
 };
 
@@ -55,8 +64,8 @@ struct VisibilityLog {
 // the map for moments only, and takes it for granted that others change it in between.
 class Tracker {
  public:
-  Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options, uint64_t seed,
-          SharedMap* map);
+  Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options,
+          const DynamicOptions& dynamic, uint64_t seed, SharedMap* map);
 
   // Begins a frame: takes the features out of the image, which needs neither the map nor the objects in it.
   // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden.
@@ -65,8 +74,8 @@ class Tracker {
   // The rotation that the motion model expects since the last frame, x_in_this = R x_in_last; after Extract.
   std::optional<Eigen::Quaterniond> PredictedRotation() const;
 
-  // Finds the pose of the frame. keyframes_waiting: those that local mapping has not come to yet.
-  TrackingResult Track(int keyframes_waiting = 0);
+  // Finds the pose of the frame. objects: what is in it. keyframes_waiting: those that local mapping has not come to yet.
+  TrackingResult Track(std::span<const DynamicBox> objects = {}, int keyframes_waiting = 0);
 
   // The rotation that was found; none without a pose in this frame or the last.
   std::optional<Eigen::Quaterniond> Rotation() const;
@@ -93,6 +102,7 @@ class Tracker {
   void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
   void GiveUpSmallMap(TrackingResult* result);
 
+  Camera camera_;
   OrbOptions orb_options_;
   TrackerOptions options_;
   SharedMap* map_;
@@ -101,6 +111,8 @@ class Tracker {
   OrbExtractor extractor_;
   Initializer initializer_;
   PoseTracker pose_tracker_;
+  DynamicFilter filter_;
+  double share_in_boxes_ = 0;  // of the last frame's keypoints, those in dynamic boxes
   LocalViewBuilder view_builder_;
   uint64_t seed_;
   Random random_;
