@@ -16,6 +16,7 @@ struct DynamicOptions {
 
   std::string method = "weights";
   double object_share = 0.8;
+  double margin_ratio = 0.02;
   double missed_object = 0.05;
   bool landmark_odds = true;
   bool more_features = true;
@@ -32,6 +33,8 @@ struct DynamicOptions {
                       kMethods});
     visit("object_share", self.object_share,
           OptionField{"", 0, 1, "Of the keypoints in a box, the part that belongs to the object (weights)."});
+    visit("margin_ratio", self.margin_ratio,
+          OptionField{"", 0, 1, "By how much of its side an object may reach out of its box (weights)."});
     visit("missed_object", self.missed_object,
           OptionField{"", 0.001, 0.5, "P(moves) of a keypoint in no box (weights)."});
     visit("landmark_odds", self.landmark_odds,

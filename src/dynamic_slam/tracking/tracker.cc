@@ -54,7 +54,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       extractor_(orb, camera),
       initializer_(camera, options.initializer, octave_scales_),
       pose_tracker_(camera, options, octave_scales_),
-      filter_(dynamic),
+      filter_(camera, dynamic, octave_scales_),
       seed_(seed),
       random_(seed) {}
 
@@ -93,6 +93,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
     state_ = tracked ? TrackingState::kTracking : TrackingState::kLost;
     if (tracked) {
       lost_frames_ = 0;
+      ++tracked_frames_;
       CountVisibility();
       frame_.reference = view_.reference;
       frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
@@ -178,6 +179,7 @@ void Tracker::EmptyMap(TrackingResult* result) {
   result->map_was_reset = true;
   result->new_keyframes.clear();
   lost_frames_ = 0;
+  tracked_frames_ = 0;
   inliers_ = 0;
 }
 
@@ -291,10 +293,10 @@ bool Tracker::Relocalise() {
 void Tracker::CountVisibility() {
   for (size_t i = 0; i < view_.size(); ++i) {
     if (in_view_[i] == 0) continue;
-    if (filter_.options().shield_hidden && filter_.HasBoxes()) {
-      const Eigen::Vector2d px = camera_.Distort(camera_.Project(frame_.cam_from_world * view_.positions[i]));
-      // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
-      if (filter_.IsInBox(px.x(), px.y())) continue;
+    // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
+    if (filter_.options().shield_hidden &&
+        filter_.IsHidden(camera_.Project(frame_.cam_from_world * view_.positions[i]))) {
+      continue;
     }
     visibility_.visible.push_back(view_.ids[i]);
   }
@@ -322,7 +324,7 @@ void VisibilityLog::ApplyTo(Map* map) {
     const LandmarkId now = map->Resolve(id);
     if (!now.IsValid()) continue;
     float& odds = map->landmarks().At(now).static_log_odds;
-    odds = std::clamp(odds + evidence, -DynamicFilter::kMaxLogOdds, DynamicFilter::kMaxLogOdds);
+    odds = std::clamp(odds + evidence, -kMaxStaticLogOdds, kMaxStaticLogOdds);
   }
   Clear();
 }
@@ -359,7 +361,9 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
 void Tracker::GiveUpSmallMap(TrackingResult* result) {
   if (lost_frames_ < options_.reset_after_frames) return;
   const size_t keyframes = map_->Read()->keyframes().size();
-  if (static_cast<int>(keyframes) > options_.reset_keyframes) return;
+  const bool is_small = static_cast<int>(keyframes) <= options_.reset_keyframes;
+  const bool is_young = lost_frames_ > tracked_frames_ && tracked_frames_ < options_.young_map_frames;
+  if (!is_small && !is_young) return;
   reason_ =
       fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_, keyframes);
   EmptyMap(result);

@@ -127,6 +127,7 @@ class Tracker {
   FrameId last_keyframe_frame_;
   FrameId start_frame_;
   int lost_frames_ = 0;
+  int tracked_frames_ = 0;  // in this map
   int inliers_ = 0;
   int most_inliers_ = 0;  // since the last keyframe
   std::string reason_;
