@@ -1,6 +1,8 @@
 #include "dynamic_slam/semantics/point_motion.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace dynamic_slam {
@@ -10,6 +12,12 @@ constexpr size_t kMinPoints = 6;
 constexpr size_t kMinRatios = 10;
 constexpr double kSideShare = 0.25;  // left and right of a person a box shows what is behind
 constexpr double kMaxGrowth = 1.1;   // from frame to frame
+constexpr double kMotionNoise_px = 1;  // of a point
+
+// Left and right of a person a box shows what is behind.
+Box Core(const Box& box) {
+  return {box.x + kSideShare * box.width, box.y, (1 - 2 * kSideShare) * box.width, box.height};
+}
 
 }  // namespace
 
@@ -19,14 +27,30 @@ double Median(std::vector<double>* values) {
   return *middle;
 }
 
-std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> motions) {
-  const Box core{box.x + kSideShare * box.width, box.y, (1 - 2 * kSideShare) * box.width, box.height};
-  std::vector<PointMotion> inside;
+std::vector<std::vector<PointMotion>> ShareMotions(std::span<const Box> boxes,
+                                                   std::span<const Eigen::Vector2d> expected_px,
+                                                   std::span<const PointMotion> motions) {
+  std::vector<std::vector<PointMotion>> shares(boxes.size());
+  std::vector<double> distances_px(boxes.size());
   for (const PointMotion& motion : motions) {
-    if (core.Contains(motion.from_px.x(), motion.from_px.y()) && motion.to_px.allFinite()) {
-      inside.push_back(motion);
+    if (!motion.to_px.allFinite()) continue;
+    const Eigen::Vector2d& at = motion.from_px;
+    double least_px = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      if (!boxes[i].Contains(at.x(), at.y())) continue;
+      distances_px[i] = (motion.to_px - at - expected_px[i]).norm();
+      least_px = std::min(least_px, distances_px[i]);
+    }
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      if (Core(boxes[i]).Contains(at.x(), at.y()) && distances_px[i] <= least_px + kMotionNoise_px) {
+        shares[i].push_back(motion);
+      }
     }
   }
+  return shares;
+}
+
+std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> inside) {
   if (inside.size() < kMinPoints) return std::nullopt;
 
   std::vector<double> dx, dy, ratios;

@@ -110,17 +110,17 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
   state->timestamp_s = input.timestamp_s;
   std::optional<Eigen::Vector2d> background_px;
   if (!input.cam_from_last) background_px = BackgroundMotion(state->tracks, input.motions);
-  const std::vector<BoxTrack> before = state->tracks;
-  for (size_t t = 0; t < before.size(); ++t) {
-    BoxTrack& track = state->tracks[t];
+  const double step_s = std::min(elapsed_s, kMaxStep_s);
+  std::vector<Box> boxes;
+  std::vector<Turn> turns;  // how the image moves there because the camera does
+  std::vector<Eigen::Vector2d> expected_px;
+  for (BoxTrack& track : state->tracks) {
     track.is_detected = false;
     track.unseen_s += elapsed_s;
     ++track.age_frames;
     ++track.missed_frames;
-    const double step_s = std::min(elapsed_s, kMaxStep_s);
     const Box box = track.filter.box();
-    // How the image moves there because the camera does.
-    Turn camera{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
+    Turn camera{background_px.value_or(Eigen::Vector2d::Zero()), Eigen::Matrix2d::Identity()};
     if (input.cam_from_last) {
       const std::optional<Turn> turn =
           RotateImage(camera_, *input.cam_from_last, {box.CenterX(), box.CenterY()});
@@ -129,17 +129,20 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
       } else {
         track.unseen_s = kNever;
       }
-    } else if (background_px) {
-      camera.shift_px = *background_px;
     }
-    // The points in the box of something hidden are on what is in front of it.
-    std::optional<BoxMotion> seen;
-    if (before[t].is_detected || !IsHidden(before[t], before)) seen = MotionOfBox(box, input.motions);
-    if (seen) {
-      track.filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale, camera.shift_px);
+    boxes.push_back(box);
+    turns.push_back(camera);
+    expected_px.push_back(camera.shift_px + step_s * track.filter.velocity_px_s());
+  }
+  const std::vector<std::vector<PointMotion>> shares = ShareMotions(boxes, expected_px, input.motions);
+  for (size_t t = 0; t < boxes.size(); ++t) {
+    BoxFilter& filter = state->tracks[t].filter;
+    if (getenv("DBG")) { const auto m = MotionOfBox(boxes[t], shares[t]); fprintf(stderr, "%u t%d box %.0f-%.0f exp %.1f %.1f n %zu seen %.1f %.1f v %.1f bg %.1f\n", input.frame.value(), state->tracks[t].id, boxes[t].x, boxes[t].x+boxes[t].width, expected_px[t].x(), expected_px[t].y(), shares[t].size(), m ? m->shift_px.x() : -99., m ? m->shift_px.y() : -99., filter.velocity_px_s().x()/30, turns[t].shift_px.x()); }
+    if (const std::optional<BoxMotion> seen = MotionOfBox(boxes[t], shares[t])) {
+      filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale, turns[t].shift_px);
     } else {
-      track.filter.Predict(options_.filter, step_s);
-      track.filter.Move(camera.shift_px, camera.jacobian);
+      filter.Predict(options_.filter, step_s);
+      filter.Move(turns[t].shift_px, turns[t].jacobian);
     }
   }
 }
