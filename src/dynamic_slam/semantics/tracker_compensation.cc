@@ -21,12 +21,10 @@ constexpr double kCoveredShare = 0.3;  // of a box below another detection: what
 constexpr double kDoubtfulNoise = 4;   // times the noise of a box that may be a part
 constexpr double kScoreLimit = 0.95;   // no single detection is surer than this
 constexpr double kMaxStep_s = 1.0;
-constexpr int kEstablishedFrames = 10;  // an object seen for so long goes on existing behind another one
+const int kEstablishedFrames = getenv("EST") ? atoi(getenv("EST")) : 10;  // an object seen for so long goes on existing behind another one
 
-// Seen for long before it was missed.
-bool IsEstablished(const BoxTrack& track) {
-  return track.age_frames - track.missed_frames >= kEstablishedFrames;
-}
+// Seen by itself: no second box that the detector puts around what another one is around already.
+bool IsEstablished(const BoxTrack& track) { return track.clear_frames >= kEstablishedFrames; }
 
 double Logit(double probability) { return std::log(probability / (1 - probability)); }
 
@@ -232,6 +230,7 @@ void TrackerCompensation::See(const Detection& detection, const std::vector<Dete
   track->is_detected = true;
   track->unseen_s = 0;
   track->missed_frames = 0;
+  if (!is_doubtful) ++track->clear_frames;
 }
 
 void TrackerCompensation::Begin(const Detection& detection, TrackerState* state) {

@@ -16,7 +16,7 @@ struct TrackerCompensationOptions {
   double max_evidence = 6.0;
   double miss_evidence = 1.5;
   double hidden_evidence = 0.2;
-  double max_unseen_s = 1.0;
+  double max_unseen_s = 1.5;
   double min_iou = 0.3;
   double max_duplicate_iou = 0.7;
   int max_boxes = 100;
@@ -63,6 +63,7 @@ struct BoxTrack {
   bool is_detected = false;                         // in the last frame
   double unseen_s = 0;
   int age_frames = 0, missed_frames = 0;
+  int clear_frames = 0;  // in which it was detected and nothing else was in its place
 
   int ClassId() const;  // with the most votes
 };
