@@ -10,8 +10,8 @@ namespace {
 
 constexpr size_t kMinPoints = 6;
 constexpr size_t kMinRatios = 10;
-constexpr double kSideShare = 0.25;  // left and right of a person a box shows what is behind
-constexpr double kMaxGrowth = 1.1;   // from frame to frame
+constexpr double kSideShare = 0.25;    // left and right of a person a box shows what is behind
+constexpr double kMaxGrowth = 1.1;     // from frame to frame
 constexpr double kMotionNoise_px = 1;  // of a point
 
 // Left and right of a person a box shows what is behind.
