@@ -286,7 +286,8 @@ std::vector<CompensatedBox> TrackerCompensation::BoxesOf(const TrackerState& sta
   std::vector<CompensatedBox> boxes;
   for (const BoxTrack& track : state.tracks) {
     const Box whole = track.filter.box();
-    const Box box = ClipToImage(whole, camera_);
+    // What the detector sees is where it sees it: no box is made worse than it was.
+    const Box box = track.is_detected ? track.seen.box : ClipToImage(whole, camera_);
     if (!track.is_detected && box.Area() < kMinVisibleShare * whole.Area()) continue;
     boxes.push_back({box, track.ClassId(), 1 / (1 + std::exp(-track.evidence)), track.id, track.is_detected,
                      track.age_frames, track.missed_frames});

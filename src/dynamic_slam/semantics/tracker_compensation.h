@@ -78,6 +78,7 @@ struct TrackerState {
 // - Assignment in two rounds: detections of a box's class first, then those of another class that overlap
 // well:
 //   an object keeps its class, by votes.
+// - A box that is detected is shown as the detector saw it, another one as it is predicted.
 // - Evidence is log-odds: a detection adds logit(score) - logit(neutral_score), a result without the object
 //   takes miss_evidence. So a box is held the longer, the longer and the better it was seen. A frame without
 //   a result says nothing against an object.

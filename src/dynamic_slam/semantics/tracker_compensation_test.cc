@@ -50,6 +50,14 @@ TEST_F(TrackerCompensationTest, PredictsThroughMisses) {
   EXPECT_EQ(boxes[0].age_frames, 34);
 }
 
+TEST_F(TrackerCompensationTest, WhatIsDetectedIsWhereTheDetectorSawIt) {
+  for (int i = 0; i < 10; ++i) feed_.See({{At(100, 100)}});
+  const auto boxes = feed_.See({{At(112, 93)}});
+  ASSERT_THAT(boxes, SizeIs(1));
+  EXPECT_EQ(boxes[0].box.x, 112);
+  EXPECT_EQ(boxes[0].box.y, 93);
+}
+
 TEST(TrackerCompensation, HoldsABoxTheLongerTheLongerAndBetterItWasSeen) {
   EXPECT_EQ(HeldFrames(1, 0.41), 0);
   // Log-odds of 0.8 over those of 0.45 are 1.59 a frame, at most 6; a miss takes 1.5.
