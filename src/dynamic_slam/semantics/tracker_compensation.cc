@@ -96,6 +96,16 @@ void NoteNeighbours(std::vector<BoxTrack>* tracks) {
   }
 }
 
+// So that what a track remembers does not grow for ever.
+void ForgetOldNeighbours(std::vector<BoxTrack>* tracks) {
+  for (BoxTrack& track : *tracks) {
+    std::erase_if(track.frames_beside, [&](const auto& beside) {
+      return std::none_of(tracks->begin(), tracks->end(),
+                          [&](const BoxTrack& other) { return other.id == beside.first; });
+    });
+  }
+}
+
 }  // namespace
 
 int BoxTrack::ClassId() const {
@@ -128,7 +138,9 @@ void TrackerCompensation::Advance(const CompensationInput& input, TrackerState* 
   if (input.detections) {
     for (const Detection& detection : Match(*input.detections, state)) Begin(detection, state);
   }
-  std::erase_if(state->tracks, [&](const BoxTrack& track) { return IsOver(track); });
+  if (std::erase_if(state->tracks, [&](const BoxTrack& track) { return IsOver(track); }) > 0) {
+    ForgetOldNeighbours(&state->tracks);
+  }
 }
 
 void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* state) const {

@@ -59,9 +59,7 @@ struct BoxTrack {
   bool is_detected = false;                         // in the last frame
   double unseen_s = 0;
   int age_frames = 0, missed_frames = 0;
-
-  std::vector<std::pair<int, int>>
-      frames_beside;  // id of another object, frames in which both were seen apart
+  std::vector<std::pair<int, int>> frames_beside;  // track id, frames in which both were seen apart
 
   int ClassId() const;  // with the most votes
   int FramesBeside(int other) const;
