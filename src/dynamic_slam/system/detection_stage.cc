@@ -79,7 +79,7 @@ std::optional<DetectionResult> DetectionStage::TakeAnswer(double timestamp_s, do
     answer_ = shared_->exchange.Read(open_->frame,
                                      Clock::now() + std::chrono::duration_cast<Clock::duration>(patience));
   }
-  if (!answer_.has_value() || timestamp_s < open_->answer_due_s) return std::nullopt;
+  if (!answer_.has_value() || !IsAnswerDue(open_->answer_due_s, timestamp_s)) return std::nullopt;
   open_.reset();
   std::optional<DetectionResult> answer = std::exchange(answer_, std::nullopt);
   if (answer->failure.empty()) return answer;
