@@ -89,13 +89,15 @@ std::optional<DetectionResult> DetectionStage::TakeAnswer(double timestamp_s, do
 }
 
 FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
-                                     const std::optional<Eigen::Quaterniond>& cam_from_last) {
+                                     const std::optional<Eigen::Quaterniond>& cam_from_last,
+                                     std::span<const PointMotion> motions) {
   DS_TRACE("detection/collect");
   FrameObjects objects;
   CompensationInput input;
   input.frame = frame;
   input.timestamp_s = timestamp_s;
   input.cam_from_last = cam_from_last;
+  input.motions.assign(motions.begin(), motions.end());
   objects.state = DetectionState::kNotAsked;
   if (open_.has_value() && open_->frame == frame) {
     objects.state = DetectionState::kLate;

@@ -7,6 +7,7 @@
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/semantics/dynamic_score.h"
 #include "dynamic_slam/tracking/dynamic_options.h"
+#include "dynamic_slam/tracking/keypoint_flow.h"
 
 namespace dynamic_slam {
 
@@ -24,22 +25,36 @@ class DynamicFilter {
  public:
   DynamicFilter(const Camera& camera, const DynamicOptions& options, std::vector<float> octave_scales);
 
-  // Fills in frame->static_probability. boxes: all objects of the frame; only dynamic ones count.
-  DynamicKeypoints Judge(std::span<const DynamicBox> boxes, Frame* frame);
+  // Fills in frame->static_probability. boxes: all objects of the frame; only dynamic ones count. flow: from
+  // the last frame to this one, matched with Boxes() of the last one.
+  DynamicKeypoints Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow, const Frame& last,
+                         Frame* frame);
+
+  // When the pose is known: which keypoints in and around boxes moved as what is at rest does, and which as
+  // the object. Changes frame->static_probability.
+  void Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame);
+
+  // The dynamic boxes of the last Judge.
+  std::vector<Box> Boxes() const;
 
   // Whether a point of the frame (ideal px) is in one of its dynamic boxes.
   bool IsHidden(const Eigen::Vector2d& ideal_px) const;
 
-  // What a frame adds to the log-odds of a landmark that was matched with a keypoint, and fits the pose or not.
+  // What a frame adds to the log-odds of a landmark that was matched with a keypoint, and fits the pose or
+  // not.
   float Evidence(float static_probability, bool fits) const;
 
   const DynamicOptions& options() const { return options_; }
 
  private:
+  void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
+  float Combine(float prior, float motion_log_odds) const;
+
   Camera camera_;
   DynamicOptions options_;
   std::vector<float> octave_scales_;
-  std::vector<DynamicBox> boxes_;
+  std::vector<DynamicBox> boxes_, last_boxes_;
+  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
 };
 
 }  // namespace dynamic_slam

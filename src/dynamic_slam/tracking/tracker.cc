@@ -55,6 +55,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       initializer_(camera, options.initializer, octave_scales_),
       pose_tracker_(camera, options, octave_scales_),
       filter_(camera, dynamic, octave_scales_),
+      flow_(camera, octave_scales_),
       seed_(seed),
       random_(seed) {}
 
@@ -70,16 +71,16 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
   frame_.grid.Build(frame_.features, bounds_);
-  frame_.static_probability.assign(frame_.features.size(), 1.0f);
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
+  flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
 }
 
 TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting) {
   DS_TRACE("tracking");
   inliers_ = 0;
   reason_.clear();
-  const DynamicKeypoints judged = filter_.Judge(objects, &frame_);
+  const DynamicKeypoints judged = filter_.Judge(objects, flow_, last_, &frame_);
   share_in_boxes_ = frame_.features.size() == 0
                         ? 0
                         : static_cast<double>(judged.InBoxes()) / static_cast<double>(frame_.features.size());
@@ -102,6 +103,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
         velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
         velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
       }
+      if (last_has_pose_) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
       if (!start_is_certain_) ReviewStart(&result);
       if (state_ == TrackingState::kTracking && !result.map_was_reset) {
         InsertKeyframeIfDue(keyframes_waiting, &result);
@@ -288,6 +290,15 @@ bool Tracker::Relocalise() {
                         why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost,
                         candidates.size());
   return false;
+}
+
+// Of the landmarks that the frame shows.
+double Tracker::MedianDepthOfFrame() const {
+  std::vector<double> depths;
+  for (size_t i = 0; i < frame_.landmarks.size(); ++i) {
+    if (frame_.landmarks[i].IsValid()) depths.push_back((frame_.cam_from_world * frame_.points[i]).z());
+  }
+  return depths.empty() ? 0 : Median(&depths);
 }
 
 void Tracker::CountVisibility() {

@@ -104,10 +104,11 @@ struct TrackerOptions {
         OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
     visit("reset_after_frames", self.reset_after_frames,
           OptionField{"", 1, 10000, "Lost frames after which such a small map is given up."});
-    visit("young_map_frames", self.young_map_frames,
-          OptionField{"", 0, 100000,
-                      "A map of less tracked frames is given up when the camera has been lost for longer than "
-                      "that."});
+    visit(
+        "young_map_frames", self.young_map_frames,
+        OptionField{"", 0, 100000,
+                    "A map of less tracked frames is given up when the camera has been lost for longer than "
+                    "that."});
     visit("initializer", self.initializer);
     visit("keyframe", self.keyframe);
     visit("pose", self.pose);
