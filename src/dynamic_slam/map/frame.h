@@ -21,8 +21,10 @@ struct Frame {
   // P(at rest) of what each keypoint shows, before anything is known of its landmark; 0: not to be used.
   std::vector<float> static_probability;
   Rigid3 cam_from_world;
-  KeyframeId reference;       // the keyframe that shares most landmarks with it
-  Rigid3 cam_from_reference;  // outlives changes of the map, which cam_from_world does not
+  KeyframeId reference;  // the keyframe that shares most landmarks with it
+  // Outlives changes of the map, which cam_from_world does not; lengths are in the reference's unit.
+  Rigid3 cam_from_reference;
+  double reference_unit = 1;  // Keyframe::unit of the reference, when the pose was found
 
   void ClearLandmarks() {
     landmarks.assign(features.size(), LandmarkId());
