@@ -1,7 +1,6 @@
 #include "dynamic_slam/features/place_index.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <numeric>
@@ -12,49 +11,61 @@
 namespace dynamic_slam {
 namespace {
 
-// Of one point seen twice, a test comes out differently in one case of eight, of two points in one of two.
-// With these limits 40% of the points are known again, and one in 10^5 pairs of others is taken for one.
-constexpr int kHalfBits = 16;
-constexpr int kMaxDifferentBits = 5;
+constexpr int kQuarters = 4, kQuarterBits = 16;
+// One less than twice the number of quarters: what differs in no more than that has a quarter that differs in
+// one.
+constexpr int kMaxDifferentBits = 2 * kQuarters - 1;
 
-constexpr uint32_t kHalfMask = (1u << kHalfBits) - 1;
-
-// From the first half of a word to the question's words that differ from it in at most one bit there.
+// From the quarters of a word to the question's words that differ from it in at most one bit of the same
+// quarter.
 class ProbeTable {
  public:
-  explicit ProbeTable(std::span<const uint32_t> words) : first_(1u << kHalfBits, kNone) {
-    probes_.reserve(words.size() * (kHalfBits + 1));
-    for (uint32_t i = 0; i < words.size(); ++i) {
-      Insert(words[i] & kHalfMask, i);
-      for (int bit = 0; bit < kHalfBits; ++bit) Insert((words[i] ^ (1u << bit)) & kHalfMask, i);
+  explicit ProbeTable(std::span<const uint64_t> words) : first_(kQuarters << kQuarterBits, kNone) {
+    DS_CHECK(words.size() <= PlaceIndex::kMaxWords, "{} words", words.size());
+    probes_.reserve(words.size() * kQuarters * (kQuarterBits + 1));
+    for (uint16_t i = 0; i < words.size(); ++i) {
+      for (int quarter = 0; quarter < kQuarters; ++quarter) {
+        const uint32_t slot = Slot(words[i], quarter);
+        Insert(slot, i);
+        for (int bit = 0; bit < kQuarterBits; ++bit) Insert(slot ^ (1u << bit), i);
+      }
     }
   }
 
+  // Calls fn for the words, some of them more than once, until it says that this is enough.
   template <class Fn>
-  void ForEach(uint32_t word, Fn&& fn) const {
-    for (uint32_t i = first_[word & kHalfMask]; i != kNone; i = probes_[i].next) {
-      if (fn(probes_[i].word)) return;
+  void ForEach(uint64_t word, Fn&& fn) const {
+    for (int quarter = 0; quarter < kQuarters; ++quarter) {
+      for (uint16_t i = first_[Slot(word, quarter)]; i != kNone; i = probes_[i].next) {
+        if (fn(probes_[i].word)) return;
+      }
     }
   }
 
  private:
-  static constexpr uint32_t kNone = 0xffffffffu;
+  static constexpr uint16_t kNone = 0xffff;
+  static_assert(PlaceIndex::kMaxWords * kQuarters * (kQuarterBits + 1) < kNone);
   struct Probe {
-    uint32_t word, next;
+    uint16_t word, next;
   };
 
-  void Insert(uint32_t half, uint32_t word) {
-    probes_.push_back({word, first_[half]});
-    first_[half] = static_cast<uint32_t>(probes_.size() - 1);
+  static uint32_t Slot(uint64_t word, int quarter) {
+    const uint64_t part = (word >> (quarter * kQuarterBits)) & ((1u << kQuarterBits) - 1);
+    return static_cast<uint32_t>(quarter) << kQuarterBits | static_cast<uint32_t>(part);
   }
 
-  std::vector<uint32_t> first_;
+  void Insert(uint32_t slot, uint16_t word) {
+    probes_.push_back({word, first_[slot]});
+    first_[slot] = static_cast<uint16_t>(probes_.size() - 1);
+  }
+
+  std::vector<uint16_t> first_;
   std::vector<Probe> probes_;
 };
 
 }  // namespace
 
-std::vector<uint32_t> PlaceWords(const FeatureSet& features, std::span<const float> static_probability,
+std::vector<uint64_t> PlaceWords(const FeatureSet& features, std::span<const float> static_probability,
                                  float min_static_probability) {
   std::vector<uint32_t> order;
   for (uint32_t i = 0; i < features.size(); ++i) {
@@ -69,13 +80,13 @@ std::vector<uint32_t> PlaceWords(const FeatureSet& features, std::span<const flo
     order.resize(PlaceIndex::kMaxWords);
     std::sort(order.begin(), order.end());
   }
-  std::vector<uint32_t> words;
+  std::vector<uint64_t> words;
   words.reserve(order.size());
-  for (const uint32_t i : order) words.push_back(static_cast<uint32_t>(features.descriptors[i][0]));
+  for (const uint32_t i : order) words.push_back(features.descriptors[i][0]);
   return words;
 }
 
-void PlaceIndex::Add(KeyframeId keyframe, std::vector<uint32_t> words) {
+void PlaceIndex::Add(KeyframeId keyframe, std::vector<uint64_t> words) {
   DS_CHECK(WordsOf(keyframe).empty(), "keyframe {}", keyframe.value());
   if (words.empty()) return;
   if (words_.size() <= keyframe.value()) words_.resize(keyframe.value() + 1);
@@ -85,7 +96,7 @@ void PlaceIndex::Add(KeyframeId keyframe, std::vector<uint32_t> words) {
 
 void PlaceIndex::Erase(KeyframeId keyframe) {
   if (WordsOf(keyframe).empty()) return;
-  std::vector<uint32_t>().swap(words_[keyframe.value()]);
+  std::vector<uint64_t>().swap(words_[keyframe.value()]);
   --size_;
 }
 
@@ -94,13 +105,13 @@ void PlaceIndex::Clear() {
   size_ = 0;
 }
 
-const std::vector<uint32_t>& PlaceIndex::WordsOf(KeyframeId keyframe) const {
-  static const std::vector<uint32_t> kNone;
+const std::vector<uint64_t>& PlaceIndex::WordsOf(KeyframeId keyframe) const {
+  static const std::vector<uint64_t> kNone;
   return keyframe.value() < words_.size() ? words_[keyframe.value()] : kNone;
 }
 
 DS_DISPATCH_POPCNT
-std::vector<PlaceMatch> PlaceIndex::Query(std::span<const uint32_t> words) const {
+std::vector<PlaceMatch> PlaceIndex::Query(std::span<const uint64_t> words) const {
   std::vector<PlaceMatch> matches;
   if (words.empty() || size_ == 0) return matches;
   const ProbeTable table(words);
@@ -109,8 +120,8 @@ std::vector<PlaceMatch> PlaceIndex::Query(std::span<const uint32_t> words) const
   std::vector<uint32_t> last_keyframe_with(words.size(), KeyframeId().value());
   for (uint32_t keyframe = 0; keyframe < words_.size(); ++keyframe) {
     const size_t begin = shared.size();
-    for (const uint32_t word : words_[keyframe]) {
-      table.ForEach(word, [&](uint32_t asked) {
+    for (const uint64_t word : words_[keyframe]) {
+      table.ForEach(word, [&](uint16_t asked) {
         if (last_keyframe_with[asked] == keyframe || std::popcount(word ^ words[asked]) > kMaxDifferentBits)
           return false;
         last_keyframe_with[asked] = keyframe;
@@ -137,8 +148,8 @@ std::vector<PlaceMatch> PlaceIndex::Query(std::span<const uint32_t> words) const
 
 size_t PlaceIndex::MemoryBytes() const {
   return std::accumulate(words_.begin(), words_.end(), sizeof(*this) + words_.capacity() * sizeof(words_[0]),
-                         [](size_t sum, const std::vector<uint32_t>& words) {
-                           return sum + words.capacity() * sizeof(uint32_t);
+                         [](size_t sum, const std::vector<uint64_t>& words) {
+                           return sum + words.capacity() * sizeof(uint64_t);
                          });
 }
 

@@ -13,8 +13,8 @@ namespace {
 
 using testing::IsEmpty;
 
-// A place is a set of points; an image of it shows most of them, and of two images of a point an eighth of the bits
-// differ.
+// A place is a set of points; an image of it shows most of them, and of two images of a point an eighth of
+// the bits differ.
 class Places {
  public:
   explicit Places(int points = 400) : points_(points) {}
@@ -37,7 +37,7 @@ class Places {
     }
     return image;
   }
-  std::vector<uint32_t> Words(uint64_t place, uint64_t view) { return PlaceWords(Image(place, view), {}, 0); }
+  std::vector<uint64_t> Words(uint64_t place, uint64_t view) { return PlaceWords(Image(place, view), {}, 0); }
 
  private:
   int points_;
@@ -66,7 +66,7 @@ TEST(PlaceIndexTest, AnImageIsMostLikeItself) {
   PlaceIndex index;
   index.Add(KeyframeId(0), places.Words(1, 0));
   index.Add(KeyframeId(1), places.Words(1, 1));
-  const std::vector<uint32_t> words = places.Words(1, 0);
+  const std::vector<uint64_t> words = places.Words(1, 0);
   const std::vector<PlaceMatch> found = index.Query(words);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].keyframe, KeyframeId(0));
@@ -79,10 +79,10 @@ TEST(PlaceIndexTest, AnImageIsMostLikeItself) {
 TEST(PlaceIndexTest, WordsThatAllHaveTellLittle) {
   Places places;
   PlaceIndex index;
-  std::vector<uint32_t> common = places.Words(1, 0), rare = places.Words(2, 0);
+  std::vector<uint64_t> common = places.Words(1, 0), rare = places.Words(2, 0);
   common.resize(100);
   rare.resize(100);
-  std::vector<uint32_t> both = common;
+  std::vector<uint64_t> both = common;
   both.insert(both.end(), rare.begin(), rare.end());
   for (uint32_t i = 0; i < 20; ++i) index.Add(KeyframeId(i), common);
   index.Add(KeyframeId(20), rare);
@@ -127,16 +127,16 @@ TEST(PlaceIndexTest, WhatMovesTakesNoPart) {
 
 TEST(PlaceIndexTest, TheStrongestKeypointsAreTaken) {
   FeatureSet image = Places(1000).Image(1, 0);
-  std::set<uint32_t> strong;
+  std::set<uint64_t> strong;
   for (size_t i = 0; i < image.size(); ++i) {
     image.keypoints[i].response = static_cast<float>((i * 7919) % 1000);
     if (image.keypoints[i].response >= 1000 - PlaceIndex::kMaxWords) {
-      strong.insert(static_cast<uint32_t>(image.descriptors[i][0]));
+      strong.insert(image.descriptors[i][0]);
     }
   }
-  const std::vector<uint32_t> words = PlaceWords(image, {}, 0);
+  const std::vector<uint64_t> words = PlaceWords(image, {}, 0);
   EXPECT_EQ(words.size(), PlaceIndex::kMaxWords);
-  for (const uint32_t word : words) EXPECT_TRUE(strong.contains(word));
+  for (const uint64_t word : words) EXPECT_TRUE(strong.contains(word));
 }
 
 TEST(PlaceIndexTest, AKeyframeTakesLessThanTwoKilobytes) {

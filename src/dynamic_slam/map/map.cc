@@ -46,7 +46,7 @@ void Map::Reset() {
 
 Keyframe& Map::AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world,
                            FeatureSet features, KeypointGrid grid, std::vector<float> static_probability) {
-  std::vector<uint32_t> words = PlaceWords(features, static_probability, kMinStaticProbability);
+  std::vector<uint64_t> words = PlaceWords(features, static_probability, kMinStaticProbability);
   Keyframe& keyframe = keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features),
                                           std::move(grid), std::move(static_probability));
   places_.Add(keyframe.id(), std::move(words));

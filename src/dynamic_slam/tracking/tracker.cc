@@ -267,7 +267,7 @@ bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
 
 // Those that look like the frame, and the youngest, where the camera was a moment ago.
 std::vector<KeyframeId> Tracker::RelocalisationCandidates() const {
-  const std::vector<uint32_t> words =
+  const std::vector<uint64_t> words =
       PlaceWords(frame_.features, frame_.static_probability, kMinStaticProbability);
   std::vector<KeyframeId> candidates, youngest;
   {
