@@ -25,7 +25,8 @@ LoopCloser::LoopCloser(const Camera& camera, const LoopOptions& options, uint64_
     : options_(options),
       map_(map),
       detector_(camera, options, map->Read()->octave_scales(), seed),
-      fusion_(camera, map->Read()->octave_scales()) {}
+      fusion_(camera, map->Read()->octave_scales()),
+      keyframes_since_loop_(options.min_keyframes_between) {}
 
 LoopResult LoopCloser::Process(KeyframeId keyframe, uint32_t epoch,
                                const std::function<bool()>& should_stop) {

@@ -40,7 +40,7 @@ class LoopCloser {
   LandmarkFusion fusion_;
   // Of the epoch:
   uint32_t epoch_ = 0;
-  int keyframes_since_loop_ = 0;
+  int keyframes_since_loop_;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops_;
 };
 

@@ -97,7 +97,7 @@ TEST(LoopCloserTest, WithoutDriftItLinksAndMovesNothing) {
 }
 
 TEST(LoopCloserTest, OtherPlacesAreRefusedWithAReason) {
-  TwoVisits visits(Sim3{}, 5.0);
+  TwoVisits visits(Sim3{}, 8.0);
   const LoopResult result = visits.Close({.min_score_ratio = 0});
   EXPECT_FALSE(result.linked);
   EXPECT_THAT(result.attempts, Each(Field(&LoopAttempt::reason, Not(IsEmpty()))));
