@@ -16,6 +16,8 @@ constexpr double kMatchRatio = 0.9;
 
 // Keyframes about the candidate whose landmarks make the old place.
 constexpr size_t kPlaceKeyframes = 15;
+// The same, to begin with: more of them have more that looks alike by chance.
+constexpr size_t kMatchedKeyframes = 5;
 
 // Neighbours of the keyframe that are asked for confirmation.
 constexpr size_t kNeighbours = 5;
@@ -30,7 +32,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-std::vector<LandmarkId> LandmarksAbout(const Map& map, const Keyframe& keyframe) {
+std::vector<LandmarkId> LandmarksAbout(const Map& map, const Keyframe& keyframe, size_t neighbours) {
   std::vector<uint8_t> is_taken(map.landmarks().CreatedCount(), 0);
   std::vector<LandmarkId> landmarks;
   const auto add = [&](const Keyframe& from) {
@@ -41,7 +43,7 @@ std::vector<LandmarkId> LandmarksAbout(const Map& map, const Keyframe& keyframe)
     }
   };
   add(keyframe);
-  for (const CovisibleKeyframe& other : keyframe.BestCovisible(kPlaceKeyframes)) {
+  for (const CovisibleKeyframe& other : keyframe.BestCovisible(neighbours)) {
     add(map.keyframes().At(other.id));
   }
   return landmarks;
@@ -136,39 +138,53 @@ std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
 
 std::vector<Sim3Match> LoopDetector::MatchLandmarks(const Map& map, const Keyframe& keyframe,
                                                     const Keyframe& candidate) const {
-  const auto with_landmark = [](const Keyframe& of) {
-    std::vector<uint32_t> keypoints;
-    for (uint32_t i = 0; i < of.landmarks().size(); ++i) {
-      if (of.landmarks()[i].IsValid()) keypoints.push_back(i);
-    }
-    return keypoints;
-  };
+  std::vector<uint32_t> own;
+  for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
+    if (keyframe.landmarks()[i].IsValid()) own.push_back(i);
+  }
+  // The landmarks about the candidate, as if they were one image.
+  const std::vector<LandmarkId> landmarks = LandmarksAbout(map, candidate, kMatchedKeyframes);
+  FeatureSet place;
+  std::vector<uint32_t> all;
+  for (const LandmarkId id : landmarks) {
+    const Landmark& landmark = map.landmarks().At(id);
+    const Observation& seen = landmark.observations().front();
+    all.push_back(static_cast<uint32_t>(all.size()));
+    place.keypoints.push_back(map.keyframes().At(seen.keyframe).keypoint(seen.keypoint));
+    place.descriptors.push_back(landmark.descriptor());
+  }
   const std::vector<Match> found =
-      MatchMutual(keyframe.features(), with_landmark(keyframe), candidate.features(),
-                  with_landmark(candidate), kMatchDistance, kMatchRatio);
+      MatchMutual(keyframe.features(), own, place, all, kMatchDistance, kMatchRatio);
   RotationConsistency rotation;
   for (const Match& match : found) {
-    rotation.Add(keyframe.keypoint(match.first).angle_rad, candidate.keypoint(match.second).angle_rad);
+    rotation.Add(keyframe.keypoint(match.first).angle_rad, place.keypoints[match.second].angle_rad);
   }
   const std::vector<uint8_t>& keep = rotation.Judge();
   std::vector<Sim3Match> matches;
   for (size_t i = 0; i < found.size(); ++i) {
-    if (keep[i] == 0) continue;
-    const Keypoint& first = keyframe.keypoint(found[i].first);
-    const Keypoint& second = candidate.keypoint(found[i].second);
-    const LandmarkId first_id = keyframe.landmarks()[found[i].first];
-    const LandmarkId second_id = candidate.landmarks()[found[i].second];
-    matches.push_back({keyframe.cam_from_world() * map.landmarks().At(first_id).position(),
-                       candidate.cam_from_world() * map.landmarks().At(second_id).position(), Pixel(first),
-                       Pixel(second), map.octave_scales()[static_cast<size_t>(first.octave)],
-                       map.octave_scales()[static_cast<size_t>(second.octave)]});
+    if (keep[i] == 0 || keyframe.landmarks()[found[i].first] == landmarks[found[i].second]) continue;
+    AddMatch(map, keyframe, candidate, found[i].first, landmarks[found[i].second], &matches);
   }
   return matches;
 }
 
+// Where the candidate would see the landmark stands for where it does: not all are in its image.
+void LoopDetector::AddMatch(const Map& map, const Keyframe& keyframe, const Keyframe& candidate,
+                            uint32_t keypoint_index, LandmarkId landmark,
+                            std::vector<Sim3Match>* matches) const {
+  const Eigen::Vector3d x = candidate.cam_from_world() * map.landmarks().At(landmark).position();
+  if (x.z() <= 0) return;
+  const Keypoint& keypoint = keyframe.keypoint(keypoint_index);
+  const double sigma_px = map.octave_scales()[static_cast<size_t>(keypoint.octave)];
+  const Landmark& own = map.landmarks().At(keyframe.landmarks()[keypoint_index]);
+  matches->push_back({keyframe.cam_from_world() * own.position(), x, Pixel(keypoint), camera_.Project(x),
+                      sigma_px, sigma_px});
+}
+
 Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate,
                           const Sim3& similarity, LoopAttempt* attempt) {
-  Loop loop{keyframe.id(), candidate.id(), similarity, {}, LandmarksAbout(map, candidate), true};
+  Loop loop{keyframe.id(), candidate.id(), similarity, {}, LandmarksAbout(map, candidate, kPlaceKeyframes),
+            true};
   const Sim3 candidate_from_world = ToSim3(candidate.cam_from_world());
   for (const double radius_px : {kFirstRadiusPx, kSecondRadiusPx}) {
     const Rigid3 pose = ToRigid3(loop.keyframe_from_candidate * candidate_from_world);
@@ -176,13 +192,9 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
     std::vector<Sim3Match> matches;
     for (const Loop::Link& link : loop.links) {
       const LandmarkId own = keyframe.landmarks()[link.keypoint];
-      const Eigen::Vector3d x = candidate.cam_from_world() * map.landmarks().At(link.landmark).position();
-      if (!own.IsValid() || own == link.landmark || x.z() <= 0) continue;
-      // Where the candidate would see the landmark stands for where it does: not all are in its image.
-      const Keypoint& keypoint = keyframe.keypoint(link.keypoint);
-      const double sigma_px = map.octave_scales()[static_cast<size_t>(keypoint.octave)];
-      matches.push_back({keyframe.cam_from_world() * map.landmarks().At(own).position(), x, Pixel(keypoint),
-                         camera_.Project(x), sigma_px, sigma_px});
+      if (own.IsValid() && own != link.landmark) {
+        AddMatch(map, keyframe, candidate, link.keypoint, link.landmark, &matches);
+      }
     }
     const Sim3Estimate refined = RefineSim3(camera_, matches, options_.sim3, loop.keyframe_from_candidate);
     attempt->sim3_inliers = refined.inliers;

@@ -62,6 +62,8 @@ class LoopDetector {
   std::vector<Candidate> Candidates(const Map& map, const Keyframe& keyframe) const;
   std::vector<Sim3Match> MatchLandmarks(const Map& map, const Keyframe& keyframe,
                                         const Keyframe& candidate) const;
+  void AddMatch(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, uint32_t keypoint_index,
+                LandmarkId landmark, std::vector<Sim3Match>* matches) const;
   // Fills in the attempt; its reason is empty when it is a loop.
   Loop Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, const Sim3& similarity,
               LoopAttempt* attempt);
