@@ -23,4 +23,14 @@ struct Sim3 {
   }
 };
 
+inline Sim3 ToSim3(const Rigid3& target_from_source) {
+  return {1.0, target_from_source.rotation, target_from_source.translation};
+}
+
+// The rigid transform that shows the same in a camera: of a source that has its unit of length, to a target
+// that has the source's too.
+inline Rigid3 ToRigid3(const Sim3& target_from_source) {
+  return {target_from_source.rotation, target_from_source.translation / target_from_source.scale};
+}
+
 }  // namespace dynamic_slam

@@ -5,10 +5,9 @@
 namespace dynamic_slam {
 
 KeyframeId InsertKeyframe(const Frame& frame, Map* map) {
-  const KeyframeId id =
-      map->AddKeyframe(frame.id, frame.timestamp_s, frame.cam_from_world, frame.features, frame.grid,
-                       frame.static_probability)
-          .id();
+  const KeyframeId id = map->AddKeyframe(frame.id, frame.timestamp_s, frame.cam_from_world, frame.features,
+                                         frame.grid, frame.static_probability)
+                            .id();
   for (uint32_t keypoint = 0; keypoint < frame.landmarks.size(); ++keypoint) {
     const LandmarkId landmark = map->Resolve(frame.landmarks[keypoint]);
     if (!landmark.IsValid() || map->landmarks().At(landmark).IsSeenBy(id)) continue;

@@ -23,8 +23,10 @@ struct Frame {
   // Log of P(at rest) / P(moves) by how each keypoint moved since it was first seen (DynamicFilter).
   std::vector<float> motion_log_odds;
   Rigid3 cam_from_world;
-  KeyframeId reference;       // the keyframe that shares most landmarks with it
-  Rigid3 cam_from_reference;  // outlives changes of the map, which cam_from_world does not
+  KeyframeId reference;  // the keyframe that shares most landmarks with it
+  // Outlives changes of the map, which cam_from_world does not; lengths are in the reference's unit.
+  Rigid3 cam_from_reference;
+  double reference_unit = 1;  // Keyframe::unit of the reference, when the pose was found
 
   void ClearLandmarks() {
     landmarks.assign(features.size(), LandmarkId());

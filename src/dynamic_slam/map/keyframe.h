@@ -39,6 +39,11 @@ class Keyframe {
   void set_cam_from_world(const Rigid3& cam_from_world) { cam_from_world_ = cam_from_world; }
   Eigen::Vector3d CenterInWorld() const { return cam_from_world_.TargetOriginInSource(); }
 
+  // As long now as one unit of length was about here when the keyframe was made: 1, until the scale is
+  // corrected.
+  double unit() const { return unit_; }
+  void Rescale(double factor) { unit_ *= factor; }
+
   const FeatureSet& features() const { return features_; }
   const Keypoint& keypoint(uint32_t index) const { return features_.keypoints[index]; }
   const KeypointGrid& grid() const { return grid_; }
@@ -51,6 +56,8 @@ class Keyframe {
   // The landmark of each keypoint; not valid where there is none.
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
   int LandmarkCount() const { return landmark_count_; }
+
+  const std::vector<float>& static_probability() const { return static_probability_; }
 
   // Keyframes that share landmarks, by id.
   const std::vector<CovisibleKeyframe>& covisible() const { return covisible_; }
@@ -66,6 +73,7 @@ class Keyframe {
   FrameId frame_id_;
   double timestamp_s_;
   Rigid3 cam_from_world_;
+  double unit_ = 1;
   FeatureSet features_;
   KeypointGrid grid_;
   std::vector<float> static_probability_;

@@ -7,6 +7,7 @@
 
 #include "dynamic_slam/base/ids.h"
 #include "dynamic_slam/features/features.h"
+#include "dynamic_slam/geometry/sim3.h"
 
 namespace dynamic_slam {
 
@@ -25,6 +26,9 @@ class Landmark {
   LandmarkId id() const { return id_; }
   const Eigen::Vector3d& position() const { return position_; }  // in world
   void set_position(const Eigen::Vector3d& position) { position_ = position; }
+
+  // Moves it with its surroundings: normal and distances go along.
+  void Transform(const Sim3& new_from_old);
 
   // The keyframe during whose processing the landmark was made: its age.
   KeyframeId created_by() const { return created_by_; }

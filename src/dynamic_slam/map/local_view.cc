@@ -20,6 +20,7 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
   view->descriptors.clear();
   view->static_log_odds.clear();
   view->reference = KeyframeId();
+  view->revision = map.revision();
 
   votes_.assign(map.keyframes().CreatedCount(), 0);
   for (const LandmarkId id : seen) {
@@ -39,6 +40,7 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
   }
   if (view->reference.IsValid()) {
     view->reference_from_world = map.keyframes().At(view->reference).cam_from_world();
+    view->reference_unit = map.keyframes().At(view->reference).unit();
   }
   const size_t limit = static_cast<size_t>(max_keyframes);
   std::stable_sort(keyframes_.begin(), keyframes_.end(),

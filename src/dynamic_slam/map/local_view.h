@@ -22,6 +22,8 @@ struct LocalView {
   std::vector<float> static_log_odds;
   KeyframeId reference;         // the keyframe that shares most landmarks with the frame
   Rigid3 reference_from_world;  // where it was when the view was made: the map goes on changing
+  double reference_unit = 1;    // Keyframe::unit
+  uint32_t revision = 0;        // of the map
 
   size_t size() const { return ids.size(); }
 };

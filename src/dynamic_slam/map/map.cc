@@ -17,6 +17,12 @@ auto FindObservation(const std::vector<Observation>& observations, KeyframeId ke
       [](const Observation& observation, KeyframeId id) { return observation.keyframe < id; });
 }
 
+// The keyframe's camera with lengths in the keyframe's own unit.
+Sim3 OwnFromWorld(const Keyframe& keyframe) {
+  const Rigid3& cam_from_world = keyframe.cam_from_world();
+  return {1 / keyframe.unit(), cam_from_world.rotation, cam_from_world.translation / keyframe.unit()};
+}
+
 }  // namespace
 
 bool Landmark::IsSeenBy(KeyframeId keyframe) const {
@@ -24,10 +30,27 @@ bool Landmark::IsSeenBy(KeyframeId keyframe) const {
   return position != observations_.end() && position->keyframe == keyframe;
 }
 
+void Landmark::Transform(const Sim3& new_from_old) {
+  position_ = new_from_old * position_;
+  normal_ = new_from_old.rotation.cast<float>() * normal_;
+  min_distance_ *= static_cast<float>(new_from_old.scale);
+  max_distance_ *= static_cast<float>(new_from_old.scale);
+}
+
 void Map::Reset() {
-  const uint32_t epoch = epoch_;
+  const uint32_t epoch = epoch_, revision = revision_;
   *this = Map(std::move(octave_scales_));
   epoch_ = epoch + 1;
+  revision_ = revision + 1;
+}
+
+Keyframe& Map::AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world,
+                           FeatureSet features, KeypointGrid grid, std::vector<float> static_probability) {
+  std::vector<uint64_t> words = PlaceWords(features, static_probability, kMinStaticProbability);
+  Keyframe& keyframe = keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features),
+                                          std::move(grid), std::move(static_probability));
+  places_.Add(keyframe.id(), std::move(words));
+  return keyframe;
 }
 
 void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id) {
@@ -83,9 +106,9 @@ void Map::EraseKeyframe(KeyframeId id, KeyframeId heir) {
     if (keyframes_.At(id).landmarks_[keypoint].IsValid()) Unlink(id, keypoint);
   }
   if (heirs_.size() <= id.value()) heirs_.resize(id.value() + 1);
-  heirs_[id.value()] = {heir,
-                        keyframes_.At(id).cam_from_world() * keyframes_.At(heir).cam_from_world().Inverse()};
+  heirs_[id.value()] = {heir, OwnFromWorld(keyframes_.At(id)) * OwnFromWorld(keyframes_.At(heir)).Inverse()};
   keyframes_.Erase(id);
+  places_.Erase(id);
 }
 
 void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {
@@ -151,7 +174,7 @@ void Map::RefreshLandmark(LandmarkId id) {
 }
 
 Map::Anchor Map::ResolveKeyframe(KeyframeId id) const {
-  Anchor anchor{id, Rigid3()};
+  Anchor anchor{id, Sim3()};
   while (!keyframes_.Contains(anchor.keyframe)) {
     DS_CHECK(anchor.keyframe.value() < heirs_.size(), "id={}", id.value());
     const Anchor& heir = heirs_[anchor.keyframe.value()];
@@ -162,7 +185,13 @@ Map::Anchor Map::ResolveKeyframe(KeyframeId id) const {
 
 Rigid3 Map::PoseFromReference(KeyframeId reference, const Rigid3& cam_from_reference) const {
   const Anchor anchor = ResolveKeyframe(reference);
-  return cam_from_reference * anchor.original_from_keyframe * keyframes_.At(anchor.keyframe).cam_from_world();
+  const Sim3 own_from_world = ToSim3(cam_from_reference) * anchor.original_from_keyframe *
+                              OwnFromWorld(keyframes_.At(anchor.keyframe));
+  return ToRigid3(own_from_world);
+}
+
+double Map::UnitOf(KeyframeId reference) const {
+  return keyframes_.At(ResolveKeyframe(reference).keyframe).unit();
 }
 
 double Map::MedianDepth(KeyframeId id) const {

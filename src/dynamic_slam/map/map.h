@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "dynamic_slam/base/ids.h"
+#include "dynamic_slam/features/place_index.h"
+#include "dynamic_slam/geometry/sim3.h"
 #include "dynamic_slam/map/id_table.h"
 #include "dynamic_slam/map/keyframe.h"
 #include "dynamic_slam/map/landmark.h"
@@ -24,11 +26,13 @@ class Map {
   void Reset();
   uint32_t epoch() const { return epoch_; }
 
+  // Counts up when poses and points change all at once, for a loop or in the adjustment of everything: what
+  // was computed from the map before does not fit it any more.
+  uint32_t revision() const { return revision_; }
+  void BeginRevision() { ++revision_; }
+
   Keyframe& AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world, FeatureSet features,
-                        KeypointGrid grid, std::vector<float> static_probability = {}) {
-    return keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features), std::move(grid),
-                              std::move(static_probability));
-  }
+                        KeypointGrid grid, std::vector<float> static_probability = {});
 
   Landmark& AddLandmark(const Eigen::Vector3d& position, KeyframeId created_by) {
     return landmarks_.Emplace(position, created_by);
@@ -54,21 +58,29 @@ class Map {
   // Recomputes normal, distances and descriptor from the observations.
   void RefreshLandmark(LandmarkId id);
 
-  // The keyframe a frame hangs on now, and the pose of the one it was made with in it.
+  // The keyframe a frame hangs on now, and the pose of the one it was made with in it, each in units of its
+  // own.
   struct Anchor {
     KeyframeId keyframe;
-    Rigid3 original_from_keyframe;
+    Sim3 original_from_keyframe;
   };
   Anchor ResolveKeyframe(KeyframeId id) const;
 
   // Pose of a frame that was tracked relative to `reference`, after all that has happened to the map since.
+  // cam_from_reference: in units of the reference (Keyframe::unit).
   Rigid3 PoseFromReference(KeyframeId reference, const Rigid3& cam_from_reference) const;
+
+  // The unit of a keyframe, and of the keyframe's heir for one that is gone.
+  double UnitOf(KeyframeId reference) const;
 
   const IdTable<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   IdTable<KeyframeId, Keyframe>& keyframes() { return keyframes_; }
   const IdTable<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
   IdTable<LandmarkId, Landmark>& landmarks() { return landmarks_; }
   const std::vector<float>& octave_scales() const { return octave_scales_; }
+
+  // What the keyframes look like; what can move takes no part.
+  const PlaceIndex& places() const { return places_; }
 
   // Median depth of the keyframe's landmarks in its camera; 0 when there are none.
   double MedianDepth(KeyframeId id) const;
@@ -78,9 +90,10 @@ class Map {
 
  private:
   std::vector<float> octave_scales_;
-  uint32_t epoch_ = 0;
+  uint32_t epoch_ = 0, revision_ = 0;
   IdTable<KeyframeId, Keyframe> keyframes_;
   IdTable<LandmarkId, Landmark> landmarks_;
+  PlaceIndex places_;
   std::vector<LandmarkId> merged_into_;  // by landmark id; filled as far as needed
   std::vector<Anchor> heirs_;            // by keyframe id; not valid while the keyframe lives
 };

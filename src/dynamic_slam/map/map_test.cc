@@ -108,6 +108,40 @@ TEST(MapTest, FramesOfAnErasedKeyframeKeepTheirPose) {
   EXPECT_THAT(map.Validate(), IsEmpty());
 }
 
+TEST(MapTest, FramesFollowTheScaleOfTheirKeyframeAndOfItsHeir) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 4, Rigid3(ExpSo3({0.1, 0, 0}), {1, 0, 0}));
+  const KeyframeId b = AddKeyframe(&map, 4, Rigid3(ExpSo3({0, 0.2, 0}), {0, 2, 0}));
+  const Rigid3 cam_from_a(ExpSo3({0.05, 0.05, 0}), {0.1, 0.2, 0.3});
+  const Eigen::Vector3d before = map.PoseFromReference(a, cam_from_a).TargetOriginInSource();
+  // The whole world becomes twice as large.
+  const auto grow = [&map](KeyframeId id) {
+    Keyframe& keyframe = map.keyframes().At(id);
+    keyframe.set_cam_from_world(
+        {keyframe.cam_from_world().rotation, 2 * keyframe.cam_from_world().translation});
+    keyframe.Rescale(2);
+  };
+  grow(a);
+  grow(b);
+  EXPECT_LT((map.PoseFromReference(a, cam_from_a).TargetOriginInSource() - 2 * before).norm(), 1e-12);
+  EXPECT_EQ(map.UnitOf(a), 2);
+  map.EraseKeyframe(a, b);
+  EXPECT_LT((map.PoseFromReference(a, cam_from_a).TargetOriginInSource() - 2 * before).norm(), 1e-12);
+  grow(b);
+  EXPECT_LT((map.PoseFromReference(a, cam_from_a).TargetOriginInSource() - 4 * before).norm(), 1e-12);
+}
+
+TEST(MapTest, KnowsThePlacesOfItsKeyframesOnly) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 4), b = AddKeyframe(&map, 4);
+  EXPECT_EQ(map.places().size(), 2u);
+  map.EraseKeyframe(a, b);
+  EXPECT_EQ(map.places().size(), 1u);
+  EXPECT_TRUE(map.places().WordsOf(a).empty());
+  map.Reset();
+  EXPECT_EQ(map.places().size(), 0u);
+}
+
 TEST(MapTest, RandomChangesKeepItValid) {
   Map map = MakeMap();
   Random random(5);

@@ -70,8 +70,13 @@ bool LocalMapper::CreateLandmarks(KeyframeId current, MappingResult* result) {
   bool valid = Look([&](const Map& map) { neighbours = factory_.Neighbours(map, current); });
   for (size_t i = 0; valid && i < neighbours.size(); ++i) {
     std::vector<LandmarkProposal> proposals;
-    valid = Look([&](const Map& map) { proposals = factory_.Propose(map, current, neighbours[i]); });
+    uint32_t revision = 0;
+    valid = Look([&](const Map& map) {
+      revision = map.revision();
+      proposals = factory_.Propose(map, current, neighbours[i]);
+    });
     valid = valid && Change([&](Map* map) {
+              if (map->revision() != revision) return;
               const std::vector<LandmarkId> added = LandmarkFactory::Add(proposals, map);
               recent_landmarks_.insert(recent_landmarks_.end(), added.begin(), added.end());
               result->created += static_cast<int>(added.size());

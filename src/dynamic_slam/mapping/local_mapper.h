@@ -6,7 +6,7 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/landmark_factory.h"
-#include "dynamic_slam/mapping/landmark_fusion.h"
+#include "dynamic_slam/map/landmark_fusion.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 

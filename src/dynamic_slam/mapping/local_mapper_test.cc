@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "dynamic_slam/map/landmark_fusion.h"
 #include "dynamic_slam/map/synthetic_world.h"
 #include "dynamic_slam/mapping/landmark_factory.h"
-#include "dynamic_slam/mapping/landmark_fusion.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 
 namespace dynamic_slam {

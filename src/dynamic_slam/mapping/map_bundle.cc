@@ -17,8 +17,12 @@ class MapBundle {
  public:
   explicit MapBundle(const Map& map)
       : epoch_(map.epoch()),
+        revision_(map.revision()),
         pose_of_(map.keyframes().CreatedCount(), kNone),
         seen_(map.landmarks().CreatedCount(), 0) {}
+
+  // Of everything: all that others compute from the map meanwhile is out of date when it ends.
+  void SetWhole() { is_whole_ = true; }
 
   void AddPose(const Map& map, KeyframeId id, bool fixed) {
     pose_of_[id.value()] = static_cast<uint32_t>(problem_.poses.size());
@@ -63,7 +67,8 @@ class MapBundle {
 
   // False, and nothing is changed, when this is not the map any more that the problem was made of.
   bool WriteBack(Map* map) const {
-    if (map->epoch() != epoch_) return false;
+    if (map->epoch() != epoch_ || map->revision() != revision_) return false;
+    if (is_whole_) map->BeginRevision();
     MoveYoungerKeyframes(map);
     for (size_t i = 0; i < keyframes_.size(); ++i) {
       if (problem_.poses[i].fixed) continue;
@@ -114,7 +119,8 @@ class MapBundle {
     });
   }
 
-  uint32_t epoch_;
+  uint32_t epoch_, revision_;
+  bool is_whole_ = false;
   BundleProblem problem_;
   std::vector<uint8_t> is_outlier_;
   std::vector<uint32_t> pose_of_;  // by keyframe id
@@ -164,6 +170,7 @@ MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& ma
 
 MapBundle WholeBundle(const Map& map) {
   MapBundle bundle(map);
+  bundle.SetWhole();
   bool first = true;
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
     bundle.AddPose(map, keyframe.id(), first);

@@ -10,7 +10,7 @@
 namespace dynamic_slam {
 
 // Both copy what they need out of the map, solve while others go on with it, and write back unless the map's
-// epoch is not `epoch` (any more): then the summary is not usable. Links that do not fit are broken.
+// epoch is not `epoch` (any more), or its revision has changed: then the summary is not usable. Links that do not fit are broken.
 // Keyframes that were inserted meanwhile move with those that they are linked to. `should_stop` may be empty;
 // it is asked between steps.
 

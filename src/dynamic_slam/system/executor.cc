@@ -65,6 +65,8 @@ TraceName Name(Lane lane) {
       return "mapping";
     case Lane::kDetection:
       return "detection";
+    case Lane::kLoop:
+      return "loop";
   }
   return "";
 }

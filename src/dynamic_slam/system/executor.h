@@ -7,8 +7,8 @@
 namespace dynamic_slam {
 
 // A queue of tasks that run one after the other. Tracking has none: it runs on the caller's thread.
-enum class Lane { kMapping, kDetection };
-inline constexpr Lane kLanes[] = {Lane::kMapping, Lane::kDetection};
+enum class Lane { kMapping, kDetection, kLoop };
+inline constexpr Lane kLanes[] = {Lane::kMapping, Lane::kDetection, Lane::kLoop};
 
 TraceName Name(Lane lane);
 

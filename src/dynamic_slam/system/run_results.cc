@@ -52,6 +52,14 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                      {"keyframes_abandoned", summary.mapping.keyframes_abandoned},
                      {"bundles_stopped", summary.mapping.bundles_stopped},
                      {"most_keyframes_waiting", summary.most_keyframes_waiting}};
+  json["loops"] = {
+      {"corrected", summary.loops.corrected},
+      {"linked", summary.loops.linked},
+      {"refused", std::count_if(summary.loops.attempts.begin(), summary.loops.attempts.end(),
+                                [](const LoopAttempt& attempt) { return !attempt.reason.empty(); })},
+      {"landmarks_merged", summary.loops.landmarks_merged},
+      {"bundles", summary.loops.bundles},
+      {"bundles_stopped", summary.loops.bundles_stopped}};
   if (summary.detection.has_value()) {
     const DetectionReport& detection = *summary.detection;
     json["detector"] = {{"name", summary.detector},
@@ -87,6 +95,18 @@ std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
     csv += fmt::format("{:.9f},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state),
                        frame.keypoints, frame.inliers, Name(frame.keyframe_reason), Name(frame.detection),
                        frame.objects, frame.tracking_ms, frame.reason);
+  }
+  return csv;
+}
+
+std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
+  std::string csv =
+      "timestamp,keyframe,candidate,score,matches,sim3_inliers,inliers,confirming,scale,drift_px,refused\n";
+  for (const LoopAttempt& attempt : attempts) {
+    csv += fmt::format("{:.9f},{},{},{:.4f},{},{},{},{},{:.4f},{:.2f},\"{}\"\n", attempt.timestamp_s,
+                       attempt.keyframe.value(), attempt.candidate.value(), attempt.score, attempt.matches,
+                       attempt.sim3_inliers, attempt.inliers, attempt.confirming, attempt.scale,
+                       attempt.drift_px, attempt.reason);
   }
   return csv;
 }
@@ -138,6 +158,7 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
     WriteKittiPoses(kitti, poses);
   }
   WriteFileAtomically(folder / "frames.csv", FramesCsv(summary.frames));
+  WriteFileAtomically(folder / "loops.csv", LoopsCsv(summary.loops.attempts));
   std::vector<Eigen::Vector3f> points;
   system.map().Read()->landmarks().ForEach(
       [&points](const Landmark& landmark) { points.push_back(landmark.position().cast<float>()); });

@@ -34,6 +34,7 @@ struct RunSummary {
   TimeStatistics tracking_ms;  // of the tracked frames
   TimeStatistics mapping_ms;   // of the keyframes; not in tracking_ms
   MappingReport mapping;
+  LoopReport loops;
   std::string detector = "none";
   std::optional<DetectionReport> detection;  // of the detector, if there is one
   int most_keyframes_waiting = 0;            // for local mapping, at any time
@@ -66,8 +67,8 @@ struct RunSummary {
 // What `failure` says; "" when there is none.
 std::string FailureMessage(const RunSummary& summary);
 
-// Writes trajectory.txt, keyframes.txt, frames.csv, map.ply, config.yaml, summary.json and, for a KITTI
-// source in which every frame has a pose, trajectory_kitti.txt into the folder, which is made. Throws
+// Writes trajectory.txt, keyframes.txt, frames.csv, loops.csv, map.ply, config.yaml, summary.json and, for a
+// KITTI source in which every frame has a pose, trajectory_kitti.txt into the folder, which is made. Throws
 // InputError when that is not possible.
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);
 

@@ -133,6 +133,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
     summary.landmarks = map->landmarks().size();
   }
   summary.mapping = system.mapping_report();
+  summary.loops = system.loop_report();
   if (system.detector() != nullptr) summary.detector = system.detector()->name();
   summary.detection = system.detection_report();
   summary.tracking_ms = log.TrackingTimes();

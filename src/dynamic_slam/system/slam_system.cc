@@ -7,6 +7,7 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/mapping/map_bundle.h"
 
 namespace dynamic_slam {
 namespace {
@@ -36,6 +37,7 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       map_(OctaveScales(options.orb)),
       tracker_(camera(), options.orb, options.tracker, options.dynamic, options.seed, &map_),
       mapper_(camera(), options.mapper, &map_),
+      loop_closer_(camera(), options.loop, options.seed, &map_),
       executor_(std::move(executor)) {}
 
 // Tasks ask the executor what waits, so none may run any more when it goes.
@@ -82,6 +84,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
                       MapKeyframe(keyframe, epoch, token);
                     });
   }
+  PostLoops();
   result.keyframes_waiting = executor_->Waiting(Lane::kMapping);
   TraceCounter("keyframes waiting", result.keyframes_waiting);
   return result;
@@ -93,6 +96,7 @@ void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::sto
     return token.stop_requested() ||
            executor_->Waiting(Lane::kMapping) >= options_.mapper.interrupting_keyframes;
   });
+  if (options_.loop.enabled && !result.abandoned) mapped_.Write()->push_back({keyframe, epoch});
   auto report = mapping_report_.Write();
   report->times_ms.push_back(MillisecondsSince(start));
   report->landmarks_created += result.created;
@@ -103,10 +107,37 @@ void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::sto
   report->keyframes_abandoned += result.abandoned;
 }
 
+void SlamSystem::PostLoops() {
+  std::vector<MappedKeyframe> mapped;
+  std::swap(mapped, *mapped_.Write());
+  for (const MappedKeyframe& keyframe : mapped) {
+    executor_->Post(Lane::kLoop,
+                    [this, keyframe](const std::stop_token& token) { CloseLoop(keyframe, token); });
+  }
+}
+
+void SlamSystem::CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token) {
+  const auto should_stop = [&token] { return token.stop_requested(); };
+  const LoopResult result = loop_closer_.Process(keyframe.id, keyframe.epoch, should_stop);
+  std::optional<BundleSummary> bundle;
+  if (result.corrected && options_.loop.full_bundle) {
+    bundle = AdjustAll(camera(), options_.mapper, should_stop, &map_);
+  }
+  auto report = loop_report_.Write();
+  report->attempts.insert(report->attempts.end(), result.attempts.begin(), result.attempts.end());
+  report->linked += result.linked && !result.corrected;
+  report->corrected += result.corrected;
+  report->landmarks_merged += result.landmarks_merged;
+  report->bundles += bundle.has_value();
+  report->bundles_stopped += bundle.has_value() && bundle->stopped;
+}
+
 BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   DS_TRACE("finish");
   if (is_stopped_) return {};
   executor_->Drain(Lane::kMapping);
+  PostLoops();
+  executor_->Drain(Lane::kLoop);
   return options_.final_bundle ? mapper_.Finish(should_stop) : BundleSummary();
 }
 
@@ -129,6 +160,8 @@ void SlamSystem::Reset() {
   if (detection_.has_value()) detection_->Reset();
   tracked_.clear();
   *mapping_report_.Write() = MappingReport();
+  *loop_report_.Write() = LoopReport();
+  mapped_.Write()->clear();
   frame_count_ = 0;
   is_stopped_ = false;
 }

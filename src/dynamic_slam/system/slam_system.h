@@ -11,6 +11,7 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
+#include "dynamic_slam/loop/loop_closer.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/local_mapper.h"
 #include "dynamic_slam/system/detection_stage.h"
@@ -43,6 +44,15 @@ struct MappingReport {
   int keyframes_culled = 0;
   int bundles_stopped = 0;      // adjustments that ended early, since keyframes were waiting
   int keyframes_abandoned = 0;  // whose map was given up
+};
+
+// What the search for loops has found so far.
+struct LoopReport {
+  std::vector<LoopAttempt> attempts;  // of all keyframes, in their order; a reason says why one was refused
+  int linked = 0;                     // places known again where nothing had to be moved
+  int corrected = 0;                  // loops after which the map was moved
+  int landmarks_merged = 0;
+  int bundles = 0, bundles_stopped = 0;  // adjustments of the whole map after that
 };
 
 // Dynamic-SLAM. All calls come from one thread; in realtime mode the stages beside tracking have their own.
@@ -92,6 +102,7 @@ class SlamSystem {
   }
   const Detector* detector() const { return detection_.has_value() ? &detection_->detector() : nullptr; }
   MappingReport mapping_report() const { return *mapping_report_.Read(); }
+  LoopReport loop_report() const { return *loop_report_.Read(); }
   RunMode mode() const { return mode_; }
   const Frame& frame() const { return tracker_.frame(); }  // of the last Process
   const SharedMap& map() const { return map_; }
@@ -108,7 +119,15 @@ class SlamSystem {
     bool is_live;  // not given its pose by a later frame
   };
 
+  struct MappedKeyframe {
+    KeyframeId id;
+    uint32_t epoch;  // of the map
+  };
+
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
+  // Looks for loops at the keyframes that local mapping has done since the last call.
+  void PostLoops();
+  void CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token);
 
   SystemOptions options_;
   ImagePreparer preparer_;
@@ -116,7 +135,10 @@ class SlamSystem {
   SharedMap map_;
   Tracker tracker_;
   LocalMapper mapper_;
+  LoopCloser loop_closer_;
   Guarded<MappingReport> mapping_report_;
+  Guarded<LoopReport> loop_report_;
+  Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
   std::vector<TrackedFrame> tracked_;
   uint32_t frame_count_ = 0;

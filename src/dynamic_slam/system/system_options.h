@@ -5,6 +5,7 @@
 #include "dynamic_slam/base/option_field.h"
 #include "dynamic_slam/features/orb_options.h"
 #include "dynamic_slam/io/image_options.h"
+#include "dynamic_slam/loop/loop_options.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/system/detection_options.h"
 #include "dynamic_slam/tracking/dynamic_options.h"
@@ -20,6 +21,7 @@ struct SystemOptions {
   OrbOptions orb;
   TrackerOptions tracker;
   MapperOptions mapper;
+  LoopOptions loop;
   DynamicOptions dynamic;
 
   template <class Self, class Visitor>
@@ -34,6 +36,7 @@ struct SystemOptions {
     visit("orb", self.orb);
     visit("tracker", self.tracker);
     visit("mapper", self.mapper);
+    visit("loop", self.loop);
   }
 };
 

@@ -73,6 +73,7 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   frame_.grid.Build(frame_.features, bounds_);
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
+  frame_.reference_unit = 1;
   flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
 }
 
@@ -98,6 +99,8 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
       CountVisibility();
       frame_.reference = view_.reference;
       frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
+      frame_.cam_from_reference.translation /= view_.reference_unit;
+      frame_.reference_unit = view_.reference_unit;
       velocity_.reset();
       if (last_has_pose_) {
         velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
@@ -196,6 +199,10 @@ void Tracker::Reset() {
 void Tracker::RefreshLastFrame() {
   const auto map = map_->Read();
   last_.cam_from_world = map->PoseFromReference(last_.reference, last_.cam_from_reference);
+  const double unit = map->UnitOf(last_.reference);
+  if (velocity_.has_value()) velocity_->translation *= unit / last_.reference_unit;
+  last_.reference_unit = unit;
+  view_.revision = map->revision();
   const Keyframe* keyframe = map->keyframes().Find(last_keyframe_);
   if (keyframe != nullptr && keyframe->frame_id() == last_.id) last_.landmarks = keyframe->landmarks();
   for (size_t i = 0; i < last_.landmarks.size(); ++i) {
@@ -227,6 +234,15 @@ std::optional<Eigen::Quaterniond> Tracker::Rotation() const {
 
 bool Tracker::TrackFrame() {
   RefreshLastFrame();
+  const uint32_t revision = view_.revision;
+  const bool tracked = TrackFromLastFrame();
+  if (view_.revision == revision) return tracked;
+  // Points from before a correction of the map were mixed with points from after it.
+  RefreshLastFrame();
+  return TrackFromLastFrame();
+}
+
+bool Tracker::TrackFromLastFrame() {
   const Rigid3 predicted = PredictMotion().value_or(Rigid3()) * last_.cam_from_world;
   int inliers = pose_tracker_.TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
   if (inliers < options_.min_motion_inliers) {
@@ -253,17 +269,22 @@ bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
   return false;
 }
 
-// The youngest keyframes, where the camera was a moment ago, and some of the older ones, others in each
-// frame: sooner or later it comes back to one of them.
+// Those that look like the frame, and the youngest, where the camera was a moment ago.
 std::vector<KeyframeId> Tracker::RelocalisationCandidates() const {
-  std::vector<KeyframeId> all;
-  map_->Read()->keyframes().ForEach([&all](const Keyframe& keyframe) { all.push_back(keyframe.id()); });
-  std::reverse(all.begin(), all.end());
-  const size_t count = std::min(all.size(), static_cast<size_t>(options_.relocalisation_keyframes));
-  const size_t young = (count + 1) / 2, older = all.size() - young;
-  std::vector<KeyframeId> candidates(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(young));
-  for (size_t i = 0; i < count - young; ++i) {
-    candidates.push_back(all[young + (static_cast<size_t>(lost_frames_) * (count - young) + i) % older]);
+  const std::vector<uint64_t> words =
+      PlaceWords(frame_.features, frame_.static_probability, kMinStaticProbability);
+  std::vector<KeyframeId> candidates, youngest;
+  {
+    const auto map = map_->Read();
+    for (const PlaceMatch& match : map->places().Query(words)) candidates.push_back(match.keyframe);
+    map->keyframes().ForEach([&](const Keyframe& keyframe) { youngest.push_back(keyframe.id()); });
+  }
+  const size_t count = static_cast<size_t>(options_.relocalisation_keyframes);
+  candidates.resize(std::min(candidates.size(), count - count / 4));
+  for (size_t i = youngest.size(); i-- > 0 && candidates.size() < count;) {
+    if (std::find(candidates.begin(), candidates.end(), youngest[i]) == candidates.end()) {
+      candidates.push_back(youngest[i]);
+    }
   }
   return candidates;
 }
@@ -365,6 +386,7 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
   most_inliers_ = 0;
   frame_.reference = last_keyframe_;
   frame_.cam_from_reference = Rigid3();
+  frame_.reference_unit = 1;
   result->new_keyframes.push_back(last_keyframe_);
 }
 

@@ -97,6 +97,7 @@ class Tracker {
   void ReviewStart(TrackingResult* result);
   void EmptyMap(TrackingResult* result);
   bool TrackFrame();
+  bool TrackFromLastFrame();
   bool Relocalise();
   std::vector<KeyframeId> RelocalisationCandidates() const;
   bool TrackLocalMap(double radius_px, int min_inliers);

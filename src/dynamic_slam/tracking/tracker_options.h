@@ -98,7 +98,8 @@ struct TrackerOptions {
           OptionField{"", 2, 1000, "Keyframes whose landmarks make the local map."});
     visit("relocalisation_keyframes", self.relocalisation_keyframes,
           OptionField{"", 1, 1000,
-                      "Keyframes tried on each frame while lost: half the youngest, half others in turn."});
+                      "Keyframes tried on each frame while lost: three quarters look like it, the others are "
+                      "the youngest."});
     visit(
         "reset_keyframes", self.reset_keyframes,
         OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});

@@ -1,4 +1,4 @@
-#include "dynamic_slam/mapping/landmark_fusion.h"
+#include "dynamic_slam/map/landmark_fusion.h"
 
 #include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/geometry/chi2.h"

@@ -1,0 +1,103 @@
+#include "dynamic_slam/loop/loop_closer.h"
+
+#include <algorithm>
+
+#include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/loop/loop_correction.h"
+
+namespace dynamic_slam {
+namespace {
+
+// Keyframes on either side of a loop in which landmarks are looked for twice.
+constexpr size_t kFusedNeighbours = 10;
+
+std::vector<KeyframeId> WithNeighbours(const Map& map, KeyframeId id) {
+  std::vector<KeyframeId> keyframes{id};
+  for (const CovisibleKeyframe& other : map.keyframes().At(id).BestCovisible(kFusedNeighbours)) {
+    keyframes.push_back(other.id);
+  }
+  return keyframes;
+}
+
+}  // namespace
+
+LoopCloser::LoopCloser(const Camera& camera, const LoopOptions& options, uint64_t seed, SharedMap* map)
+    : options_(options),
+      map_(map),
+      detector_(camera, options, map->Read()->octave_scales(), seed),
+      fusion_(camera, map->Read()->octave_scales()),
+      keyframes_since_loop_(options.min_keyframes_between) {}
+
+LoopResult LoopCloser::Process(KeyframeId keyframe, uint32_t epoch,
+                               const std::function<bool()>& should_stop) {
+  DS_TRACE("loop");
+  if (epoch != epoch_) {
+    epoch_ = epoch;
+    loops_.clear();
+    keyframes_since_loop_ = options_.min_keyframes_between;
+  }
+  LoopResult result;
+  if (keyframes_since_loop_++ < options_.min_keyframes_between) return result;
+  const std::optional<Loop> loop = detector_.Detect(keyframe, epoch, *map_, &result.attempts);
+  if (loop.has_value()) Close(*loop, should_stop, &result);
+  return result;
+}
+
+void LoopCloser::Close(const Loop& loop, const std::function<bool()>& should_stop, LoopResult* result) {
+  uint32_t revision = 0;
+  const auto is_there = [&](const Map& map) {
+    return map.epoch() == epoch_ && map.keyframes().Contains(loop.keyframe) &&
+           map.keyframes().Contains(loop.candidate);
+  };
+  std::optional<LoopCorrection> correction;
+  std::string& reason = result->attempts.back().reason;
+  if (loop.has_drifted) {
+    {
+      const auto map = map_->Read();
+      revision = map->revision();
+      if (is_there(*map)) correction.emplace(*map, loop, options_, loops_);
+    }
+    if (!correction.has_value() || !correction->Solve(should_stop)) {
+      reason = "the correction was stopped, or failed";
+      return;
+    }
+  }
+  const auto map = map_->Write();
+  if (!is_there(*map) || (correction.has_value() && map->revision() != revision)) {
+    reason = "the map has changed meanwhile";
+    return;
+  }
+  if (correction.has_value()) {
+    correction->Apply(map.get());
+    loops_.emplace_back(loop.keyframe, loop.candidate);
+    keyframes_since_loop_ = 0;
+    result->corrected = true;
+  }
+  result->landmarks_merged = Merge(loop, map.get());
+  result->linked = true;
+}
+
+int LoopCloser::Merge(const Loop& loop, Map* map) {
+  DS_TRACE("loop/merge");
+  int merged = 0;
+  for (const Loop::Link& link : loop.links) {
+    const LandmarkId old = map->Resolve(link.landmark);
+    if (!old.IsValid() || map->landmarks().At(old).IsSeenBy(loop.keyframe)) continue;
+    const LandmarkId own = map->keyframes().At(loop.keyframe).landmarks()[link.keypoint];
+    if (own.IsValid()) {
+      map->MergeLandmarks(own, old);
+      ++merged;
+    } else {
+      map->Link(loop.keyframe, link.keypoint, old);
+      map->RefreshLandmark(old);
+    }
+  }
+  const std::vector<KeyframeId> here = WithNeighbours(*map, loop.keyframe);
+  const std::vector<KeyframeId> there = WithNeighbours(*map, loop.candidate);
+  for (const KeyframeId keyframe : here) merged += fusion_.FuseInto(keyframe, loop.landmarks, map).merged;
+  const std::vector<LandmarkId> own = map->keyframes().At(loop.keyframe).landmarks();
+  for (const KeyframeId keyframe : there) merged += fusion_.FuseInto(keyframe, own, map).merged;
+  return merged;
+}
+
+}  // namespace dynamic_slam

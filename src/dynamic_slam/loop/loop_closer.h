@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "dynamic_slam/loop/loop_detector.h"
+#include "dynamic_slam/loop/loop_options.h"
+#include "dynamic_slam/map/landmark_fusion.h"
+#include "dynamic_slam/map/shared_map.h"
+
+namespace dynamic_slam {
+
+struct LoopResult {
+  std::vector<LoopAttempt> attempts;
+  bool linked = false;     // the keyframe was linked to the old landmarks
+  bool corrected = false;  // and the map was moved, so that they fit
+  int landmarks_merged = 0;
+};
+
+// Looks for a loop at each keyframe that local mapping has done, and closes it: the essential graph is
+// optimised over similarities, points move with their keyframes, landmarks that are one are merged.
+// Synchronous; holds the map's lock for moments, and one to move everything. What mapping and tracking
+// compute meanwhile from the map of before they drop, or put right (Map::revision).
+class LoopCloser {
+ public:
+  LoopCloser(const Camera& camera, const LoopOptions& options, uint64_t seed, SharedMap* map);
+
+  // `keyframe` was put into the map of this epoch. `should_stop` may be empty; when it says so, nothing is
+  // corrected.
+  LoopResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
+
+ private:
+  void Close(const Loop& loop, const std::function<bool()>& should_stop, LoopResult* result);
+  int Merge(const Loop& loop, Map* map);
+
+  LoopOptions options_;
+  SharedMap* map_;
+  LoopDetector detector_;
+  LandmarkFusion fusion_;
+  // Of the epoch:
+  uint32_t epoch_ = 0;
+  int keyframes_since_loop_;
+  std::vector<std::pair<KeyframeId, KeyframeId>> loops_;
+};
+
+}  // namespace dynamic_slam

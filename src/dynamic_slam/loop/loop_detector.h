@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/loop/loop_options.h"
+#include "dynamic_slam/map/landmark_projector.h"
+#include "dynamic_slam/map/shared_map.h"
+
+namespace dynamic_slam {
+
+// A place that looked like a keyframe's, and how far the look was confirmed.
+struct LoopAttempt {
+  KeyframeId keyframe, candidate;
+  double timestamp_s = 0;  // of the keyframe
+  double score = 0;        // of PlaceIndex
+  int matches = 0;         // of landmarks, by their descriptors
+  int sim3_inliers = 0;    // of these
+  int inliers = 0;         // landmarks of the old place that show where the similarity puts them
+  int confirming = 0;      // neighbours of the keyframe that see them too
+  double scale = 1;        // length about the keyframe over the same length about the candidate
+  double drift_px = 0;     // from where the map has the old landmarks to where they are, median
+  std::string reason;      // why it was refused; empty when it was not
+};
+
+// A keyframe that sees what was seen before, though the map does not know it.
+struct Loop {
+  struct Link {
+    uint32_t keypoint;  // of the keyframe
+    LandmarkId landmark;
+  };
+
+  KeyframeId keyframe, candidate;
+  Sim3 keyframe_from_candidate;       // cameras, each in the map's unit of length about it
+  std::vector<Link> links;            // what the keyframe sees of the old place
+  std::vector<LandmarkId> landmarks;  // of the old place
+  bool has_drifted = true;            // else the map is right, and lacks the links only
+};
+
+// Looks for loops: places that look alike, matches, a similarity, matches by projection, a look by the
+// neighbours. Holds the map's lock for moments; changes nothing.
+class LoopDetector {
+ public:
+  LoopDetector(const Camera& camera, const LoopOptions& options, const std::vector<float>& octave_scales,
+               uint64_t seed);
+
+  // The first candidate that passes is the loop; what became of each one tried goes to the end of *attempts.
+  // Nothing when the map is not of the epoch any more.
+  std::optional<Loop> Detect(KeyframeId keyframe, uint32_t epoch, const SharedMap& map,
+                             std::vector<LoopAttempt>* attempts);
+
+ private:
+  struct Candidate {
+    LoopAttempt attempt;
+    std::vector<Sim3Match> matches;
+  };
+
+  std::vector<Candidate> Candidates(const Map& map, const Keyframe& keyframe) const;
+  std::vector<Sim3Match> MatchLandmarks(const Map& map, const Keyframe& keyframe,
+                                        const Keyframe& candidate) const;
+  void AddMatch(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, uint32_t keypoint_index,
+                LandmarkId landmark, std::vector<Sim3Match>* matches) const;
+  // Fills in the attempt; its reason is empty when it is a loop.
+  Loop Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, const Sim3& similarity,
+              LoopAttempt* attempt);
+  // What the keyframe sees of the landmarks from where it would be among them.
+  std::vector<Loop::Link> FindLandmarks(const Map& map, const Keyframe& keyframe,
+                                        const Rigid3& cam_from_world,
+                                        const std::vector<LandmarkId>& landmarks, double radius_px);
+
+  Camera camera_;
+  LoopOptions options_;
+  LandmarkProjector projector_;
+  uint64_t seed_;
+};
+
+}  // namespace dynamic_slam
