@@ -100,6 +100,12 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   frame->static_probability.assign(n, 1.0f);
   frame->motion_log_odds.assign(n, 0.0f);
   prior_.assign(n, 1.0f);
+  if (boxes_.empty()) {
+    // Nothing is known that could move.
+    DynamicKeypoints counts;
+    counts.outside = static_cast<int>(n);
+    return counts;
+  }
   std::vector<uint8_t> in_box(n, 0);
   for (size_t i = 0; i < n; ++i) {
     const Keypoint& keypoint = frame->features.keypoints[i];

@@ -69,13 +69,13 @@ struct TrackerOptions {
   double motion_radius_px = 15;
   double local_map_radius_px = 4;
   int min_motion_inliers = 15;
-  int min_inliers = 20;
+  int min_inliers = 30;
   int min_relocalisation_inliers = 30;
   int local_keyframes = 60;
   int relocalisation_keyframes = 20;
   int reset_keyframes = 5;
   int reset_after_frames = 15;
-  int young_map_frames = 150;
+  int young_map_frames = 60;
   InitializerOptions initializer;
   KeyframePolicyOptions keyframe;
   PoseOptimizerOptions pose;
