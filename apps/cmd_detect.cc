@@ -214,7 +214,9 @@ void AddDetectCommand(CLI::App& app, int* exit_code) {
       ->check(CLI::IsMember(CompensationOptions::kMethods))
       ->capture_default_str();
   command->add_option("--out-compensated", a.out_compensated, "File for the boxes after compensation");
-  command->add_option("--detector-latency-ms", a.latency_ms, "Compensation gets each result so much later")
+  command
+      ->add_option("--detector-latency-ms", a.latency_ms,
+                   "Compensation asks about one image at a time and gets each answer so much later")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--models", a.models, "Folder in which network files are looked for too");
   command->add_option("--every", a.every, "Only each n-th image")

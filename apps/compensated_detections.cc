@@ -1,9 +1,9 @@
 #include "compensated_detections.h"
 
+#include "dynamic_slam/semantics/detection_exchange.h"
+
 namespace dynamic_slam {
 namespace {
-
-constexpr double kStampTolerance_s = 1e-4;
 
 std::unique_ptr<BoxCompensation> Make(const std::string& method, const Camera& camera) {
   CompensationOptions options;
@@ -20,19 +20,17 @@ CompensatedDetections::CompensatedDetections(const std::string& method, const Ca
 std::vector<CompensatedBox> CompensatedDetections::Update(FrameId frame, double timestamp_s,
                                                           const cv::Mat& image,
                                                           const std::vector<Detection>& detections) {
+  if (open_ && IsAnswerDue(open_->timestamp_s + latency_s_, timestamp_s)) {
+    compensation_->UpdateLate(open_->frame, open_->detections);
+    open_.reset();
+  }
   CompensationInput input{frame, timestamp_s, {}, {}, motion_.Update(image)};
   if (latency_s_ <= 0) {
     input.detections = detections;
-    return compensation_->Update(input);
+  } else if (!open_) {
+    open_ = {frame, timestamp_s, detections};
   }
-  compensation_->Update(input);
-  under_way_.push_back({frame, timestamp_s, detections});
-  while (!under_way_.empty() &&
-         under_way_.front().timestamp_s + latency_s_ <= timestamp_s + kStampTolerance_s) {
-    compensation_->UpdateLate(under_way_.front().frame, under_way_.front().detections);
-    under_way_.pop_front();
-  }
-  return compensation_->Boxes();
+  return compensation_->Update(input);
 }
 
 }  // namespace dynamic_slam

@@ -11,6 +11,22 @@
 namespace dynamic_slam {
 namespace {
 
+// Fig. 7, 11 and 13: what the pose rests on is drawn full, in a dynamic box yellow; what is not trusted is a red
+// dot, the rest a grey one.
+void DrawKeypoints(const Frame& frame, cv::Mat* picture) {
+  const cv::Scalar used(90, 220, 90), kept(0, 220, 255), culled(60, 60, 230), unused(150, 150, 150);
+  for (size_t i = 0; i < frame.features.size(); ++i) {
+    const Keypoint& keypoint = frame.features.keypoints[i];
+    const cv::Point2f at(keypoint.raw_x, keypoint.raw_y);
+    const bool trusted = frame.static_probability[i] >= kMinStaticProbability;
+    if (frame.landmarks[i].IsValid()) {
+      cv::circle(*picture, at, 3, trusted ? used : kept, cv::FILLED, cv::LINE_AA);
+    } else {
+      cv::circle(*picture, at, 1, trusted ? unused : culled, cv::FILLED, cv::LINE_AA);
+    }
+  }
+}
+
 void DrawStatus(const std::string& text, cv::Mat* picture) {
   constexpr int kHeightPx = 20;
   cv::rectangle(*picture, {0, picture->rows - kHeightPx, picture->cols, kHeightPx}, cv::Scalar::all(30),
@@ -35,6 +51,7 @@ void OverlayWriter::Write(const RunProgress& progress) {
         fmt::format("{} {:.2f}", class_names_[static_cast<size_t>(object.class_id)], object.score);
     DrawBox(object.box, label, object.is_detected ? kDetectedColour : kCompensatedColour, &picture_);
   }
+  DrawKeypoints(*progress.frame_in_work, &picture_);
   const TrackingResult& tracking = progress.result->tracking;
   DrawStatus(fmt::format("frame {}  {}  {} inliers  detector {}", progress.frame - 1, Name(tracking.state),
                          tracking.inliers, Name(progress.result->objects.state)),

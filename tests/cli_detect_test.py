@@ -1,9 +1,11 @@
 """`dynamic_slam detect` and `models` as a user meets them; no network is needed."""
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 PROGRAM = ""
@@ -84,9 +86,53 @@ class CliDetectTest(unittest.TestCase):
             self.assertRegex(result.stdout, method + r" +1.000 +1.000 +0.000 +1.000 +1.000\n")
             with open(filled) as file:
                 self.assertEqual(len(file.readlines()), 13)
-        # 100 ms later: the first three images are without boxes, all others have them.
+        # 100 ms later: every third image is asked about, and the answer comes with the next one that is. So the first
+        # three images are without boxes, all others have them.
         result = run_program(*arguments, "--compensation", "tracker", "--detector-latency-ms", "100")
         self.assertRegex(result.stdout, r"tracker +0.750 +1.000 +0.250 +0.750 +0.750\n")
+
+    def test_asks_a_slow_detector_about_one_image_at_a_time(self):
+        # 500 ms are 15 images: asked about are 0, 15, 30 and 45. A person who is there only in image 20 is never found;
+        # one from image 15 on is from image 30 on.
+        images = self.path("many")
+        os.makedirs(images)
+        for i in range(60):
+            with open(os.path.join(images, f"{i:02}.pgm"), "wb") as file:
+                file.write(b"P5 64 48 255\n" + bytes([100]) * (64 * 48))
+        stamps = [f"{i / 30:.9f}" for i in range(60)]
+        rows = [f"{stamps[20]},person,0.9,0,0,9,9\n"] + [f"{t},person,0.9,10,10,20,30\n" for t in stamps[15:]]
+        boxes = self.write("in.csv", "timestamp,class,score,x,y,w,h\n" + "".join(rows))
+        result = run_program("detect", images, "--detector", "boxes:" + boxes, "--out", self.path("out.csv"),
+                             "--compensation", "tracker", "--out-compensated", self.path("late.csv"),
+                             "--detector-latency-ms", "500")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.path("late.csv")) as file:
+            late = [line.split(",") for line in file][1:]
+        self.assertEqual([round(float(row[0]) * 30) for row in late], list(range(30, 60)))
+        self.assertEqual({tuple(round(float(x)) for x in row[3:]) for row in late}, {(10, 10, 20, 30)})
+
+    def test_ctrl_c_writes_the_boxes_so_far(self):
+        images = self.path("many")
+        os.makedirs(images)
+        for i in range(20000):
+            os.link(os.path.join(self.images, "0.pgm"), os.path.join(images, f"{i:05}.pgm"))
+        boxes = self.write("in.csv", "timestamp,class,score,x,y,w,h\n"
+                           + "".join(f"{i / 30:.9f},person,0.9,10,10,20,30\n" for i in range(20000)))
+        process = subprocess.Popen([PROGRAM, "detect", images, "--detector", "boxes:" + boxes, "--out",
+                                    self.path("out.csv"), "--images", self.path("pictures"), "--compensation", "tracker",
+                                    "--out-compensated", self.path("filled.csv")],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while process.poll() is None and not os.path.exists(self.path("pictures/000001.jpg")):
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 130, stderr)
+        pictures = len(os.listdir(self.path("pictures")))
+        self.assertLess(pictures, 20000)
+        self.assertIn(f"{pictures} boxes in {pictures} images", stdout)
+        for name in "out.csv", "filled.csv":
+            with open(self.path(name)) as file:
+                self.assertEqual(len(file.readlines()), pictures + 1, name)
 
     def test_latency_needs_a_compensation(self):
         self.assert_input_error(["detect", self.images, "--detector", "hog", "--out", self.path("out.csv"),

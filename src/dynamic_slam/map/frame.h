@@ -20,6 +20,8 @@ struct Frame {
   std::vector<float> static_log_odds;   // of that landmark, when it was matched
   // P(at rest) of what each keypoint shows, before anything is known of its landmark; 0: not to be used.
   std::vector<float> static_probability;
+  // Log of P(at rest) / P(moves) by how each keypoint moved since it was first seen (DynamicFilter).
+  std::vector<float> motion_log_odds;
   Rigid3 cam_from_world;
   KeyframeId reference;  // the keyframe that shares most landmarks with it
   // Outlives changes of the map, which cam_from_world does not; lengths are in the reference's unit.

@@ -7,6 +7,7 @@
 #include "dynamic_slam/features/features.h"
 #include "dynamic_slam/features/keypoint_grid.h"
 #include "dynamic_slam/geometry/rigid3.h"
+#include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
 
@@ -15,9 +16,6 @@ struct CovisibleKeyframe {
   KeyframeId id;
   int weight = 0;
 };
-
-// No landmark is made of a keypoint whose P(at rest) is below this, and it takes no part in the start.
-inline constexpr float kMinStaticProbability = 0.5f;
 
 // An image that stays in the map. Its links to landmarks and other keyframes are made by Map alone.
 class Keyframe {

@@ -47,12 +47,14 @@ class MapBundle {
       problem_.points.push_back({landmark.position(), false});
       for (const Observation& observation : landmark.observations()) {
         if (!HasPose(observation.keyframe)) continue;
-        const Keypoint& keypoint = map.keyframes().At(observation.keyframe).keypoint(observation.keypoint);
+        const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
+        const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
         problem_.observations.push_back({pose_of_[observation.keyframe.value()],
                                          point,
                                          {keypoint.x, keypoint.y},
                                          1.0 / map.octave_scales()[static_cast<size_t>(keypoint.octave)],
-                                         1.0});
+                                         TrustInMatch(keyframe.StaticProbability(observation.keypoint),
+                                                      landmark.static_log_odds)});
         links_.push_back({observation, id});
       }
     }

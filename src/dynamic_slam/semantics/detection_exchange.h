@@ -19,6 +19,14 @@ struct DetectionResult {
   std::string failure;  // why there is no result; empty when there is one
 };
 
+// Whether an answer that is to be used from the stamp `due_s` on may be used for an image of `timestamp_s`:
+// the simulated slow network of `run` and of `detect`. Stamps are rounded, so one that is a little early
+// counts.
+inline bool IsAnswerDue(double due_s, double timestamp_s) {
+  constexpr double kStampTolerance_s = 1e-4;
+  return timestamp_s + kStampTolerance_s >= due_s;
+}
+
 // The hand-off from the detection thread to tracking: the paper's `Detection` class (section 3.3), safe to
 // write and read from two threads. Keyed by frame, so that a result is never taken for another frame's.
 class DetectionExchange {

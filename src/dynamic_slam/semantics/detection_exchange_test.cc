@@ -13,6 +13,12 @@ constexpr std::chrono::minutes kLong(10);
 
 DetectionResult ResultOf(uint32_t frame) { return {FrameId(frame), {{{1, 2, 3, 4}, 0, 0.5}}, ""}; }
 
+TEST(IsAnswerDue, BearsStampsThatWereRounded) {
+  EXPECT_FALSE(IsAnswerDue(1.5, 1.4667));
+  EXPECT_TRUE(IsAnswerDue(1.5, 1.49999));
+  EXPECT_TRUE(IsAnswerDue(1.5, 1.5));
+}
+
 TEST(DetectionExchangeTest, AResultIsReadOnceAndOnlyForItsFrame) {
   DetectionExchange exchange;
   EXPECT_FALSE(exchange.Read(FrameId(1), Clock::now()).has_value());

@@ -1,6 +1,8 @@
 #include "dynamic_slam/semantics/point_motion.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace dynamic_slam {
@@ -8,8 +10,28 @@ namespace {
 
 constexpr size_t kMinPoints = 6;
 constexpr size_t kMinRatios = 10;
-constexpr double kSideShare = 0.25;  // left and right of a person a box shows what is behind
-constexpr double kMaxGrowth = 1.1;   // from frame to frame
+constexpr double kSideShare = 0.25;    // left and right of a person a box shows what is behind
+constexpr double kMaxGrowth = 1.1;     // from frame to frame
+constexpr double kMotionNoise_px = 1;  // of a point
+
+// Left and right of a person a box shows what is behind.
+Box Core(const Box& box) {
+  return {box.x + kSideShare * box.width, box.y, (1 - 2 * kSideShare) * box.width, box.height};
+}
+
+// Which points start inside the box, in order. Without branches: where points are is hard to predict.
+std::vector<size_t> PointsIn(const Box& box, std::span<const PointMotion> motions) {
+  std::vector<size_t> inside(motions.size());
+  const double right = box.x + box.width, bottom = box.y + box.height;
+  size_t count = 0;
+  for (size_t m = 0; m < motions.size(); ++m) {
+    const double x = motions[m].from_px.x(), y = motions[m].from_px.y();
+    inside[count] = m;
+    count += static_cast<size_t>((x >= box.x) & (y >= box.y) & (x < right) & (y < bottom));
+  }
+  inside.resize(count);
+  return inside;
+}
 
 }  // namespace
 
@@ -19,23 +41,43 @@ double Median(std::vector<double>* values) {
   return *middle;
 }
 
-std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> motions) {
-  const Box core{box.x + kSideShare * box.width, box.y, (1 - 2 * kSideShare) * box.width, box.height};
-  std::vector<PointMotion> inside;
-  for (const PointMotion& motion : motions) {
-    if (core.Contains(motion.from_px.x(), motion.from_px.y()) && motion.to_px.allFinite()) {
-      inside.push_back(motion);
+std::vector<std::vector<PointMotion>> ShareMotions(std::span<const Box> boxes,
+                                                   std::span<const Eigen::Vector2d> expected_px,
+                                                   std::span<const PointMotion> motions) {
+  std::vector<std::vector<PointMotion>> shares(boxes.size());
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    std::vector<size_t> rivals;
+    for (size_t k = 0; k < boxes.size(); ++k) {
+      if (k != i && IntersectionArea(boxes[i], boxes[k]) > 0) rivals.push_back(k);
+    }
+    for (const size_t m : PointsIn(Core(boxes[i]), motions)) {
+      const PointMotion& motion = motions[m];
+      if (!motion.to_px.allFinite()) continue;
+      const auto misfit_px = [&](size_t k) {
+        return (motion.to_px - motion.from_px - expected_px[k]).norm();
+      };
+      const bool fits = std::none_of(rivals.begin(), rivals.end(), [&](size_t k) {
+        return boxes[k].Contains(motion.from_px.x(), motion.from_px.y()) &&
+               misfit_px(k) + kMotionNoise_px < misfit_px(i);
+      });
+      if (fits) shares[i].push_back(motion);
     }
   }
+  return shares;
+}
+
+std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> inside) {
   if (inside.size() < kMinPoints) return std::nullopt;
 
   std::vector<double> dx, dy, ratios;
+  for (std::vector<double>* values : {&dx, &dy, &ratios}) values->reserve(inside.size());
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const PointMotion& motion : inside) {
     dx.push_back(motion.to_px.x() - motion.from_px.x());
     dy.push_back(motion.to_px.y() - motion.from_px.y());
-    mean += motion.from_px / static_cast<double>(inside.size());
+    mean += motion.from_px;
   }
+  mean /= static_cast<double>(inside.size());
   // Distances between points that are far apart grow with the object. One partner each bounds the time.
   for (size_t i = 0; i < inside.size(); ++i) {
     const PointMotion& a = inside[i];

@@ -24,8 +24,15 @@ struct BoxMotion {
 // The value in the middle; not empty, and their order is lost.
 double Median(std::vector<double>* values);
 
+// The points in the middle of each box. One in the middle of several goes to those whose expected shift (px)
+// it fits: so boxes of objects that cross keep each its own motion, and none follows the points in front of
+// it.
+std::vector<std::vector<PointMotion>> ShareMotions(std::span<const Box> boxes,
+                                                   std::span<const Eigen::Vector2d> expected_px,
+                                                   std::span<const PointMotion> motions);
+
 // The motion of the object that fills most of the box, from the points in its middle: medians, which bear
 // that almost half of them belong to something else. Nothing when there are too few points.
-std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> motions);
+std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> inside);
 
 }  // namespace dynamic_slam

@@ -36,16 +36,40 @@ TEST(MotionOfBox, BearsPointsOfTheBackground) {
   for (size_t i = 0; i < motions.size(); ++i) {
     if (i % 5 < 2) motions[i].to_px = motions[i].from_px + Eigen::Vector2d(-9, 9);
   }
-  motions[1].to_px.x() = std::numeric_limits<double>::quiet_NaN();
   const auto motion = MotionOfBox(kBox, motions);
   ASSERT_TRUE(motion);
   EXPECT_NEAR(motion->shift_px.x(), 6, 1);
   EXPECT_NEAR(motion->shift_px.y(), -4, 1);
 }
 
-TEST(MotionOfBox, NeedsPointsInsideTheBox) {
-  EXPECT_FALSE(MotionOfBox(kBox, {}));
-  EXPECT_FALSE(MotionOfBox({300, 100, 100, 200}, Points({6, -4}, 1)));
+TEST(MotionOfBox, NeedsPointsInsideTheBox) { EXPECT_FALSE(MotionOfBox(kBox, {})); }
+
+TEST(ShareMotions, GivesABoxThePointsInItsMiddle) {
+  const std::vector<Box> boxes = {kBox, {300, 100, 100, 200}};
+  const std::vector<Eigen::Vector2d> expected(2, Eigen::Vector2d::Zero());
+  const auto shares = ShareMotions(boxes, expected, Points({6, -4}, 1));
+  ASSERT_EQ(shares.size(), 2u);
+  EXPECT_EQ(shares[0].size(), 100u);  // columns 125 to 165 ...
+  EXPECT_TRUE(shares[1].empty());
+}
+
+TEST(ShareMotions, APointInTwoBoxesIsOfTheOneWhoseMotionItFits) {
+  // The second box covers the first one's middle.
+  const std::vector<Box> boxes = {kBox, {60, 100, 150, 200}};
+  const auto points = Points({6, -4}, 1);
+  auto shares = ShareMotions(boxes, std::vector<Eigen::Vector2d>{{0, 0}, {7, -4}}, points);
+  EXPECT_TRUE(shares[0].empty());
+  EXPECT_FALSE(shares[1].empty());
+  // Both move alike: the points say something of both.
+  shares = ShareMotions(boxes, std::vector<Eigen::Vector2d>{{6, -4}, {6.5, -4}}, points);
+  EXPECT_FALSE(shares[0].empty());
+  EXPECT_FALSE(shares[1].empty());
+}
+
+TEST(ShareMotions, SkipsPointsThatAreNowhere) {
+  auto points = Points({6, -4}, 1);
+  for (PointMotion& point : points) point.to_px.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(ShareMotions(std::vector{kBox}, std::vector{Eigen::Vector2d(6, -4)}, points)[0].empty());
 }
 
 }  // namespace

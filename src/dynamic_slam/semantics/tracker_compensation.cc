@@ -12,23 +12,33 @@ namespace dynamic_slam {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr double kOtherClassIou = 0.6;     // a detection of another class must overlap by this
-constexpr double kLowScoreIou = 0.5;       // and one with a low score by this: many are parts of something
-constexpr double kBorder = 0.01;           // of the image's size: a box so near to the border is cut by it
-constexpr double kMinVisibleShare = 0.25;  // of a predicted box in the image
-constexpr double kHiddenShare = 0.5;       // of a box behind another one
+constexpr double kOtherClassIou = 0.6;  // a detection of another class must overlap by this
+constexpr double kBorder = 0.01;        // of the image's size: a box so near to the border is cut by it
+// Of an unseen box in the image, else it is not shown. Half is what counts as visible; a little less, as how
+// far a box reaches outside is a guess.
+constexpr double kMinVisibleShare = 0.4;
+constexpr double kHiddenShare = 0.5;   // of a box behind another one
 constexpr double kCoveredShare = 0.3;  // of a box below another detection: what is seen of it may be a part
 constexpr double kDoubtfulNoise = 4;   // times the noise of a box that may be a part
 constexpr double kScoreLimit = 0.95;   // no single detection is surer than this
 constexpr double kMaxStep_s = 1.0;
-constexpr int kEstablishedFrames = 10;  // an object seen for so long goes on existing behind another one
-
-// Seen for long before it was missed.
-bool IsEstablished(const BoxTrack& track) {
-  return track.age_frames - track.missed_frames >= kEstablishedFrames;
-}
+// Two objects are two when they were seen beside each other so often: the confirmation of tracks in Wojke et
+// al., "Simple Online and Realtime Tracking with a Deep Association Metric", ICIP 2017.
+constexpr int kConfirmations = 3;
 
 double Logit(double probability) { return std::log(probability / (1 - probability)); }
+
+// Adds to the value of a key.
+template <class Value>
+void AddTo(std::vector<std::pair<int, Value>>* values, int key, Value more) {
+  const auto entry =
+      std::find_if(values->begin(), values->end(), [key](const auto& v) { return v.first == key; });
+  if (entry == values->end()) {
+    values->emplace_back(key, more);
+  } else {
+    entry->second += more;
+  }
+}
 
 // How the neighbourhood of a pixel moves when the camera turns.
 struct Turn {
@@ -74,6 +84,28 @@ std::optional<Turn> RotateImage(const Camera& camera, const Eigen::Quaterniond& 
   return motion;
 }
 
+// Counts for each pair of objects the frames in which both are seen apart.
+void NoteNeighbours(std::vector<BoxTrack>* tracks) {
+  for (BoxTrack& track : *tracks) {
+    for (const BoxTrack& other : *tracks) {
+      if (other.id == track.id || !track.is_detected || !other.is_detected) continue;
+      const double least_area = std::min(track.seen.box.Area(), other.seen.box.Area());
+      if (IntersectionArea(track.seen.box, other.seen.box) > kCoveredShare * least_area) continue;
+      AddTo(&track.frames_beside, other.id, 1);
+    }
+  }
+}
+
+// So that what a track remembers does not grow for ever.
+void ForgetOldNeighbours(std::vector<BoxTrack>* tracks) {
+  for (BoxTrack& track : *tracks) {
+    std::erase_if(track.frames_beside, [&](const auto& beside) {
+      return std::none_of(tracks->begin(), tracks->end(),
+                          [&](const BoxTrack& other) { return other.id == beside.first; });
+    });
+  }
+}
+
 }  // namespace
 
 int BoxTrack::ClassId() const {
@@ -82,26 +114,33 @@ int BoxTrack::ClassId() const {
       ->first;
 }
 
+int BoxTrack::FramesBeside(int other) const {
+  const auto known = std::find_if(frames_beside.begin(), frames_beside.end(),
+                                  [other](const auto& f) { return f.first == other; });
+  return known == frames_beside.end() ? 0 : known->second;
+}
+
 TrackerCompensation::TrackerCompensation(const TrackerCompensationOptions& options, const Camera& camera)
     : options_(options), camera_(camera) {}
 
 std::vector<Detection> TrackerCompensation::Usable(std::span<const Detection> detections) const {
-  return UsableDetections(detections, camera_, options_.low_score, options_.max_boxes,
+  return UsableDetections(detections, camera_, options_.min_score, options_.max_boxes,
                           options_.max_duplicate_iou);
 }
 
 double TrackerCompensation::Evidence(double score) const {
-  return Logit(std::clamp(score, 1 - kScoreLimit, kScoreLimit)) - Logit(options_.neutral_score);
+  return std::max(0.0,
+                  Logit(std::clamp(score, 1 - kScoreLimit, kScoreLimit)) - Logit(options_.neutral_score));
 }
 
 void TrackerCompensation::Advance(const CompensationInput& input, TrackerState* state) {
   Predict(input, state);
   if (input.detections) {
-    for (const Detection& detection : Match(*input.detections, state)) {
-      if (detection.score >= options_.high_score) Begin(detection, state);
-    }
+    for (const Detection& detection : Match(*input.detections, state)) Begin(detection, state);
   }
-  std::erase_if(state->tracks, [&](const BoxTrack& track) { return IsOver(track); });
+  if (std::erase_if(state->tracks, [&](const BoxTrack& track) { return IsOver(track); }) > 0) {
+    ForgetOldNeighbours(&state->tracks);
+  }
 }
 
 void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* state) const {
@@ -110,17 +149,17 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
   state->timestamp_s = input.timestamp_s;
   std::optional<Eigen::Vector2d> background_px;
   if (!input.cam_from_last) background_px = BackgroundMotion(state->tracks, input.motions);
-  const std::vector<BoxTrack> before = state->tracks;
-  for (size_t t = 0; t < before.size(); ++t) {
-    BoxTrack& track = state->tracks[t];
+  const double step_s = std::min(elapsed_s, kMaxStep_s);
+  std::vector<Box> boxes;
+  std::vector<Turn> turns;  // how the image moves there because the camera does
+  std::vector<Eigen::Vector2d> expected_px;
+  for (BoxTrack& track : state->tracks) {
     track.is_detected = false;
     track.unseen_s += elapsed_s;
     ++track.age_frames;
     ++track.missed_frames;
-    const double step_s = std::min(elapsed_s, kMaxStep_s);
     const Box box = track.filter.box();
-    // How the image moves there because the camera does.
-    Turn camera{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
+    Turn camera{background_px.value_or(Eigen::Vector2d::Zero()), Eigen::Matrix2d::Identity()};
     if (input.cam_from_last) {
       const std::optional<Turn> turn =
           RotateImage(camera_, *input.cam_from_last, {box.CenterX(), box.CenterY()});
@@ -129,17 +168,19 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
       } else {
         track.unseen_s = kNever;
       }
-    } else if (background_px) {
-      camera.shift_px = *background_px;
     }
-    // The points in the box of something hidden are on what is in front of it.
-    std::optional<BoxMotion> seen;
-    if (before[t].is_detected || !IsHidden(before[t], before)) seen = MotionOfBox(box, input.motions);
-    if (seen) {
-      track.filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale, camera.shift_px);
+    boxes.push_back(box);
+    turns.push_back(camera);
+    expected_px.push_back(camera.shift_px + step_s * track.filter.velocity_px_s());
+  }
+  const std::vector<std::vector<PointMotion>> shares = ShareMotions(boxes, expected_px, input.motions);
+  for (size_t t = 0; t < boxes.size(); ++t) {
+    BoxFilter& filter = state->tracks[t].filter;
+    if (const std::optional<BoxMotion> seen = MotionOfBox(boxes[t], shares[t])) {
+      filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale, turns[t].shift_px);
     } else {
-      track.filter.Predict(options_.filter, step_s);
-      track.filter.Move(camera.shift_px, camera.jacobian);
+      filter.Predict(options_.filter, step_s);
+      filter.Move(turns[t].shift_px, turns[t].jacobian);
     }
   }
 }
@@ -148,7 +189,6 @@ double TrackerCompensation::Cost(const BoxTrack& track, const Detection& detecti
   if ((track.ClassId() == detection.class_id) != same_class) return kNever;
   const Box predicted = track.filter.box();
   const double iou = IoU(ClipToImage(predicted, camera_), detection.box);
-  if (detection.score < options_.high_score && iou < kLowScoreIou) return kNever;
   if (!same_class) return iou >= kOtherClassIou ? 1 - iou : kNever;
   // Distance decides between boxes that the prediction does not reach.
   const double distance =
@@ -161,14 +201,14 @@ std::vector<Detection> TrackerCompensation::Match(const std::vector<Detection>& 
                                                   TrackerState* state) const {
   std::vector<BoxTrack>& tracks = state->tracks;
   std::vector<bool> is_used(detections.size(), false);
-  // One round: the tracks still unseen against the unused detections that qualify.
-  const auto assign = [&](auto qualifies, bool same_class) {
+  // One round: the tracks still unseen against the unused detections.
+  const auto assign = [&](bool same_class) {
     std::vector<size_t> rows, columns;
     for (size_t t = 0; t < tracks.size(); ++t) {
       if (!tracks[t].is_detected) rows.push_back(t);
     }
     for (size_t d = 0; d < detections.size(); ++d) {
-      if (!is_used[d] && qualifies(detections[d])) columns.push_back(d);
+      if (!is_used[d]) columns.push_back(d);
     }
     Eigen::MatrixXd costs(rows.size(), columns.size());
     for (size_t r = 0; r < rows.size(); ++r) {
@@ -184,16 +224,14 @@ std::vector<Detection> TrackerCompensation::Match(const std::vector<Detection>& 
       See(detections[d], detections, &tracks[rows[r]]);
     }
   };
-  const auto is_high = [&](const Detection& d) { return d.score >= options_.high_score; };
-  assign(is_high, true);
-  assign([&](const Detection& d) { return !is_high(d); }, true);
-  assign(is_high, false);
+  assign(true);
+  assign(false);
 
+  NoteNeighbours(&tracks);
   for (BoxTrack& track : tracks) {
     if (track.is_detected) continue;
     // What stands behind something else cannot be seen, which says little against it.
-    const bool is_hidden = IsEstablished(track) && IsHidden(track, tracks);
-    track.evidence -= is_hidden ? options_.hidden_evidence : options_.miss_evidence;
+    track.evidence -= IsHidden(track, tracks) ? options_.hidden_evidence : options_.miss_evidence;
   }
   std::vector<Detection> left;
   for (size_t d = 0; d < detections.size(); ++d) {
@@ -206,25 +244,11 @@ void TrackerCompensation::See(const Detection& detection, const std::vector<Dete
                               BoxTrack* track) const {
   const Box predicted = track->filter.box();
   const bool is_covered = std::any_of(all.begin(), all.end(), [&](const Detection& other) {
-    return &other != &detection && other.score >= options_.high_score &&
-           IntersectionArea(predicted, other.box) > kCoveredShare * predicted.Area();
+    return &other != &detection && IntersectionArea(predicted, other.box) > kCoveredShare * predicted.Area();
   });
-  const bool is_doubtful = is_covered || detection.score < options_.high_score;
-  track->filter.Update(options_.filter, Completed(detection.box, predicted),
-                       is_doubtful ? kDoubtfulNoise : 1);
-  const auto vote = std::find_if(track->class_votes.begin(), track->class_votes.end(),
-                                 [&](const auto& v) { return v.first == detection.class_id; });
-  if (vote == track->class_votes.end()) {
-    track->class_votes.emplace_back(detection.class_id, detection.score);
-  } else {
-    vote->second += detection.score;
-  }
-  // What is seen of a covered object may be a part with a low score, which says no more than not to see it.
-  double gain = Evidence(detection.score);
-  if (is_covered && IsEstablished(*track)) gain = std::max(gain, -options_.hidden_evidence);
-  // A detection that would begin an object does not end one.
-  const double least = detection.score >= options_.high_score ? std::max(gain, 0.0) : -kNever;
-  track->evidence = std::clamp(track->evidence + gain, least, options_.max_evidence);
+  track->filter.Update(options_.filter, Completed(detection.box, predicted), is_covered ? kDoubtfulNoise : 1);
+  AddTo(&track->class_votes, detection.class_id, detection.score);
+  track->evidence = std::min(track->evidence + Evidence(detection.score), options_.max_evidence);
   track->seen = detection;
   track->is_detected = true;
   track->unseen_s = 0;
@@ -235,7 +259,7 @@ void TrackerCompensation::Begin(const Detection& detection, TrackerState* state)
   if (state->tracks.size() >= static_cast<size_t>(options_.max_boxes)) return;
   BoxTrack track(NextTrackId(), BoxFilter(options_.filter, detection.box));
   track.class_votes.emplace_back(detection.class_id, detection.score);
-  track.evidence = std::clamp(Evidence(detection.score), 0.0, options_.max_evidence);
+  track.evidence = std::min(Evidence(detection.score), options_.max_evidence);
   track.seen = detection;
   track.is_detected = true;
   track.age_frames = 1;
@@ -243,11 +267,7 @@ void TrackerCompensation::Begin(const Detection& detection, TrackerState* state)
 }
 
 bool TrackerCompensation::IsOver(const BoxTrack& track) const {
-  const bool is_seen_well = track.is_detected && track.seen.score >= options_.high_score;
-  if (is_seen_well) return false;
-  const Box box = track.filter.box();
-  return track.evidence <= 0 || track.unseen_s > options_.max_unseen_s ||
-         ClipToImage(box, camera_).Area() < kMinVisibleShare * box.Area();
+  return !track.is_detected && (track.evidence <= 0 || track.unseen_s > options_.max_unseen_s);
 }
 
 Box TrackerCompensation::Completed(const Box& detected, const Box& predicted) const {
@@ -269,14 +289,18 @@ Box TrackerCompensation::Completed(const Box& detected, const Box& predicted) co
 bool TrackerCompensation::IsHidden(const BoxTrack& track, const std::vector<BoxTrack>& tracks) const {
   const Box box = ClipToImage(track.filter.box(), camera_);
   return std::any_of(tracks.begin(), tracks.end(), [&](const BoxTrack& other) {
-    return other.is_detected && IntersectionArea(box, other.seen.box) > kHiddenShare * box.Area();
+    return other.is_detected && IntersectionArea(box, other.seen.box) > kHiddenShare * box.Area() &&
+           track.FramesBeside(other.id) >= kConfirmations;
   });
 }
 
 std::vector<CompensatedBox> TrackerCompensation::BoxesOf(const TrackerState& state) const {
   std::vector<CompensatedBox> boxes;
   for (const BoxTrack& track : state.tracks) {
-    const Box box = ClipToImage(track.filter.box(), camera_);
+    const Box whole = track.filter.box();
+    // What the detector sees is where it sees it: no box is made worse than it was.
+    const Box box = track.is_detected ? track.seen.box : ClipToImage(whole, camera_);
+    if (!track.is_detected && box.Area() < kMinVisibleShare * whole.Area()) continue;
     boxes.push_back({box, track.ClassId(), 1 / (1 + std::exp(-track.evidence)), track.id, track.is_detected,
                      track.age_frames, track.missed_frames});
   }

@@ -10,13 +10,12 @@
 namespace dynamic_slam {
 
 struct TrackerCompensationOptions {
-  double low_score = 0.3;
-  double high_score = 0.4;
+  double min_score = 0.4;
   double neutral_score = 0.45;
   double max_evidence = 6.0;
   double miss_evidence = 1.5;
   double hidden_evidence = 0.2;
-  double max_unseen_s = 1.0;
+  double max_unseen_s = 1.5;
   double min_iou = 0.3;
   double max_duplicate_iou = 0.7;
   int max_boxes = 100;
@@ -24,19 +23,16 @@ struct TrackerCompensationOptions {
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
-    visit("low_score", self.low_score,
+    visit("min_score", self.min_score,
           OptionField{"", 0, 1, "Detections with a lower score are not looked at."});
-    visit("high_score", self.high_score,
-          OptionField{"", 0, 1, "A detection needs this score to begin an object."});
-    visit(
-        "neutral_score", self.neutral_score,
-        OptionField{"", 0.01, 0.99, "A detection with this score speaks neither for an object nor against."});
+    visit("neutral_score", self.neutral_score,
+          OptionField{"", 0.01, 0.99, "A detection with this score or less says nothing new of an object."});
     visit("max_evidence", self.max_evidence,
           OptionField{"", 0, 20, "Log-odds grow no further; over miss_evidence, the misses one outlives."});
     visit("miss_evidence", self.miss_evidence,
           OptionField{"", 0.01, 20, "What a result without the object takes off its log-odds."});
     visit("hidden_evidence", self.hidden_evidence,
-          OptionField{"", 0.01, 20, "The same of an object that is behind another one."});
+          OptionField{"", 0.01, 20, "The same of an object that is behind one that it was seen beside."});
     visit("max_unseen_s", self.max_unseen_s,
           OptionField{"s", 0, 10, "An object is given up when it was not seen for longer."});
     visit("min_iou", self.min_iou,
@@ -63,8 +59,10 @@ struct BoxTrack {
   bool is_detected = false;                         // in the last frame
   double unseen_s = 0;
   int age_frames = 0, missed_frames = 0;
+  std::vector<std::pair<int, int>> frames_beside;  // track id, frames in which both were seen apart
 
   int ClassId() const;  // with the most votes
+  int FramesBeside(int other) const;
 };
 
 struct TrackerState {
@@ -75,16 +73,19 @@ struct TrackerState {
 // The compensation used by default: a Kalman filter for each box, detections assigned to boxes by the
 // Hungarian method, the camera's rotation taken out, and the evidence for each object gathered over time.
 //
-// - Assignment in rounds: detections above high_score first, then the others, which may only go on with an
-//   object that is there (Zhang et al., "ByteTrack", ECCV 2022), then those of another class that overlap
-//   well: an object keeps its class, by votes.
+// - Assignment in two rounds: detections of a box's class first, then those of another class that overlap
+// well:
+//   an object keeps its class, by votes.
+// - A box that is detected is shown as the detector saw it, another one as it is predicted.
 // - Evidence is log-odds: a detection adds logit(score) - logit(neutral_score), a result without the object
 //   takes miss_evidence. So a box is held the longer, the longer and the better it was seen. A frame without
 //   a result says nothing against an object.
-// - An object behind another one is still there: not to see it takes hidden_evidence only, it moves on with
-// its
-//   own velocity and the background's instead of the points in front of it, and what is detected of it, which
-//   may be a part, counts less.
+// - An object behind another one is still there: not to see it takes hidden_evidence only. The two must have
+//   been seen beside each other, else they may be one object with two boxes.
+// - Where boxes overlap, each point that is followed speaks for the box whose motion it fits (ShareMotions):
+// an
+//   object behind another one moves on with its own velocity.
+// - An object out of view is remembered while its evidence lasts, as the camera may turn back.
 class TrackerCompensation : public ReplayingCompensation<TrackerState> {
  public:
   TrackerCompensation(const TrackerCompensationOptions& options, const Camera& camera);

@@ -79,7 +79,7 @@ std::optional<DetectionResult> DetectionStage::TakeAnswer(double timestamp_s, do
     answer_ = shared_->exchange.Read(open_->frame,
                                      Clock::now() + std::chrono::duration_cast<Clock::duration>(patience));
   }
-  if (!answer_.has_value() || timestamp_s < open_->answer_due_s) return std::nullopt;
+  if (!answer_.has_value() || !IsAnswerDue(open_->answer_due_s, timestamp_s)) return std::nullopt;
   open_.reset();
   std::optional<DetectionResult> answer = std::exchange(answer_, std::nullopt);
   if (answer->failure.empty()) return answer;
@@ -89,13 +89,15 @@ std::optional<DetectionResult> DetectionStage::TakeAnswer(double timestamp_s, do
 }
 
 FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
-                                     const std::optional<Eigen::Quaterniond>& cam_from_last) {
+                                     const std::optional<Eigen::Quaterniond>& cam_from_last,
+                                     std::span<const PointMotion> motions) {
   DS_TRACE("detection/collect");
   FrameObjects objects;
   CompensationInput input;
   input.frame = frame;
   input.timestamp_s = timestamp_s;
   input.cam_from_last = cam_from_last;
+  input.motions.assign(motions.begin(), motions.end());
   objects.state = DetectionState::kNotAsked;
   if (open_.has_value() && open_->frame == frame) {
     objects.state = DetectionState::kLate;

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -60,9 +61,11 @@ class DetectionStage {
   // Asks about the image (as Detector takes it), which must not change any more.
   void Submit(FrameId frame, double timestamp_s, const cv::Mat& image);
 
-  // The boxes of the frame, whether it was asked about or not. cam_from_last: as far as it is known.
+  // The boxes of the frame, whether it was asked about or not. cam_from_last, motions: as far as known
+  // (CompensationInput).
   FrameObjects Collect(FrameId frame, double timestamp_s,
-                       const std::optional<Eigen::Quaterniond>& cam_from_last);
+                       const std::optional<Eigen::Quaterniond>& cam_from_last,
+                       std::span<const PointMotion> motions = {});
 
   // How the camera turned after all.
   void SetRotation(FrameId frame, const Eigen::Quaterniond& cam_from_last);

@@ -121,6 +121,19 @@ TEST_F(DetectionStageTest, ASlowNetworkIsLateAndStillOfUse) {
   EXPECT_EQ(stage_->report().on_time, 0);
 }
 
+TEST_F(DetectionStageTest, ALatencyOfWholeFramesLastsNoLongerBecauseStampsAreRounded) {
+  DetectionOptions options;
+  options.latency_ms = 100;
+  Make([](FrameId frame) { return std::vector<Detection>{Walker(frame)}; }, options);
+  for (uint32_t i = 0; i < 30; ++i) {
+    const double stamp_s = 1305031452 + std::round(1e5 * i / kFps) / 1e5;
+    const bool is_asked = stage_->Begin(FrameId(i), stamp_s);
+    EXPECT_EQ(is_asked, i % 3 == 0) << i;
+    if (is_asked) stage_->Submit(FrameId(i), stamp_s, image_);
+    stage_->Collect(FrameId(i), stamp_s, std::nullopt);
+  }
+}
+
 TEST_F(DetectionStageTest, AFailureIsNamedAndTheBoxStaysForAWhile) {
   Make([](FrameId frame) {
     if (frame.value() >= 10) throw std::runtime_error("out of memory");

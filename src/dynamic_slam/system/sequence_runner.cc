@@ -108,7 +108,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
       const FrameResult result = system.Process(image->timestamp_s, image->image);
       log.Add(image->timestamp_s, result);
       if (control.on_frame)
-        control.on_frame({summary.frames.size(), announced, &*image, &result, &system.map()});
+        control.on_frame({summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map()});
     }
     end_feed();
     if (summary.interrupted) system.Stop();

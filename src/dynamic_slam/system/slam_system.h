@@ -104,6 +104,7 @@ class SlamSystem {
   MappingReport mapping_report() const { return *mapping_report_.Read(); }
   LoopReport loop_report() const { return *loop_report_.Read(); }
   RunMode mode() const { return mode_; }
+  const Frame& frame() const { return tracker_.frame(); }  // of the last Process
   const SharedMap& map() const { return map_; }
   const ImagePreparer& preparer() const { return preparer_; }
   const Camera& camera() const { return preparer_.camera(); }  // of the prepared images

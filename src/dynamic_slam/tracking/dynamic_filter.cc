@@ -2,64 +2,225 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "dynamic_slam/map/static_evidence.h"
+#include "dynamic_slam/semantics/point_motion.h"
+#include "dynamic_slam/semantics/selective_tracking.h"
 
 namespace dynamic_slam {
+namespace {
 
-double TrustInMatch(float static_probability, float static_log_odds) {
-  if (static_probability >= 1) return 1;
-  const double odds = static_probability / (1.0 - static_probability) * std::exp(static_log_odds);
-  return odds / (1 + odds);
+// A corner is found where a circle of this radius, in px of its octave, differs from its centre (Rosten and
+// Drummond 2006): so near to an outline it is made of the object and of what is behind it, and moves with
+// neither.
+constexpr double kCornerRadius = 3;
+
+// Nothing at rest is expected nearer than this part of the median depth.
+constexpr double kNearestDepthRatio = 0.3;
+
+// How far beyond its box, over its mean side, an object is watched: an arm's length.
+constexpr double kReach = 0.25;
+
+// By so many sigmas an object must move differently from what is at rest for a motion to tell them apart.
+constexpr double kApart = 3;
+
+// Spread of the motions of an object's parts, over its own motion.
+constexpr double kLimbs = 0.4;
+
+// Density of wrong matches, which lie anywhere in the window of the search, over their share of a tenth;
+// 1/px^2.
+constexpr double kMismatch = 0.1 / (std::numbers::pi * 20 * 20);
+
+// What one frame can tell at most, as errors of matches have longer tails than any model.
+constexpr double kMostEvidence = 2;
+
+double Square(double x) { return x * x; }
+
+double DistanceToSegment(const Eigen::Vector2d& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  const Eigen::Vector2d along = b - a;
+  const double squared = along.squaredNorm();
+  const double t = squared > 0 ? std::clamp((p - a).dot(along) / squared, 0.0, 1.0) : 0.0;
+  return (p - a - t * along).norm();
 }
+
+bool Contains(const Box& box, double x, double y, double margin_px) {
+  return x >= box.x - margin_px && y >= box.y - margin_px && x < box.x + box.width + margin_px &&
+         y < box.y + box.height + margin_px;
+}
+
+}  // namespace
+
+DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options,
+                             std::vector<float> octave_scales)
+    : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)) {}
 
 float DynamicFilter::Evidence(float static_probability, bool fits) const {
   if (!options_.landmark_odds || static_probability <= 0 || static_probability >= 1) return 0;
-  // Of what is at rest nearly all fits; of what moves some does by chance, as it stops or as windows are narrow.
+  // Of what is at rest nearly all fits; of what moves some does by chance, as it stops or as windows are
+  // narrow.
   constexpr double kFitsAtRest = 0.95, kFitsMoving = 0.35;
-  const double seen = fits ? std::log(kFitsAtRest / kFitsMoving) : std::log((1 - kFitsAtRest) / (1 - kFitsMoving));
+  const double seen =
+      fits ? std::log(kFitsAtRest / kFitsMoving) : std::log((1 - kFitsAtRest) / (1 - kFitsMoving));
   // Frames that follow each other tell nearly the same.
   constexpr double kNews = 0.1;
   return static_cast<float>(kNews * (seen + std::log(static_probability / (1.0 - static_probability))));
 }
 
-bool DynamicFilter::IsInBox(double raw_x, double raw_y) const {
+bool DynamicFilter::IsHidden(const Eigen::Vector2d& ideal_px) const {
+  if (boxes_.empty()) return false;
+  const Eigen::Vector2d px = camera_.Distort(ideal_px);
   return std::any_of(boxes_.begin(), boxes_.end(),
-                     [&](const DynamicBox& box) { return box.box.box.Contains(raw_x, raw_y); });
+                     [&](const DynamicBox& box) { return box.box.box.Contains(px.x(), px.y()); });
 }
 
-float DynamicFilter::PriorAt(double raw_x, double raw_y) const {
-  double p = 1;
-  for (const DynamicBox& box : boxes_) {
-    if (box.box.box.Contains(raw_x, raw_y)) p *= 1.0 - box.probability * options_.object_share;
-  }
-  return static_cast<float>(std::clamp(p, 0.01, 1.0 - options_.missed_object));
+std::vector<Box> DynamicFilter::Boxes() const {
+  std::vector<Box> boxes;
+  for (const DynamicBox& box : boxes_) boxes.push_back(box.box.box);
+  return boxes;
 }
 
-DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, Frame* frame) {
+float DynamicFilter::Combine(float prior, float motion_log_odds) const {
+  return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
+}
+
+DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
+                                      const Frame& last, Frame* frame) {
+  last_boxes_.swap(boxes_);
   boxes_.clear();
-  DynamicKeypoints counts;
-  const size_t n = frame->features.size();
-  frame->static_probability.assign(n, 1.0f);
   if (options_.method != "none") {
     for (const DynamicBox& box : boxes) {
       if (box.is_dynamic) boxes_.push_back(box);
     }
   }
+  const size_t n = frame->features.size();
   const bool weights = options_.method == "weights";
+  frame->static_probability.assign(n, 1.0f);
+  frame->motion_log_odds.assign(n, 0.0f);
+  prior_.assign(n, 1.0f);
+  std::vector<uint8_t> in_box(n, 0);
   for (size_t i = 0; i < n; ++i) {
     const Keypoint& keypoint = frame->features.keypoints[i];
-    const bool in_box = IsInBox(keypoint.raw_x, keypoint.raw_y);
-    if (!in_box) {
-      ++counts.outside;
-    } else {
-      ++counts.culled;
+    const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
+    double at_rest = 1;
+    for (const DynamicBox& box : boxes_) {
+      const Box& b = box.box.box;
+      const double margin_px = weights ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
+      if (!Contains(b, keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
+      in_box[i] = 1;
+      at_rest *= 1 - box.probability * options_.object_share;
     }
     if (weights) {
-      frame->static_probability[i] = PriorAt(keypoint.raw_x, keypoint.raw_y);
-    } else {
-      frame->static_probability[i] = in_box ? 0.0f : 1.0f;
+      prior_[i] = static_cast<float>(std::min(at_rest, 1 - options_.missed_object));
+      if (const uint32_t from = flow.last_keypoints()[i]; options_.motion && from != KeypointFlow::kNone) {
+        frame->motion_log_odds[i] = last.motion_log_odds[from];
+      }
+      frame->static_probability[i] = Combine(prior_[i], frame->motion_log_odds[i]);
+    } else if (in_box[i] != 0) {
+      frame->static_probability[i] = 0;
     }
   }
+  if (options_.method == "paper" && !boxes_.empty()) JudgeByDisplacement(flow, last, frame);
+  DynamicKeypoints counts;
+  for (size_t i = 0; i < n; ++i) {
+    const bool used = frame->static_probability[i] >= kMinStaticProbability;
+    ++(in_box[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
+  }
   return counts;
+}
+
+// Algorithm 2.
+void DynamicFilter::JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const {
+  const size_t n = frame->features.size();
+  std::vector<Eigen::Vector2d> positions(n);
+  std::vector<std::optional<Eigen::Vector2d>> displacements(n);
+  for (size_t i = 0; i < n; ++i) {
+    const Keypoint& to = frame->features.keypoints[i];
+    positions[i] = {to.raw_x, to.raw_y};
+    if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
+    const Keypoint& from = last.features.keypoints[flow.last_keypoints()[i]];
+    displacements[i] = positions[i] - Eigen::Vector2d(from.raw_x, from.raw_y);
+  }
+  const SelectiveResult result = SelectiveTracking(options_.selective, positions, displacements, Boxes());
+  for (size_t i = 0; i < n; ++i) {
+    const bool used =
+        result.keypoints[i] == KeypointJudgement::kStatic || result.keypoints[i] == KeypointJudgement::kKept;
+    frame->static_probability[i] = used ? 1 : 0;
+  }
+}
+
+void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
+  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
+  // How each box moved that was there in the last frame too.
+  struct Mover {
+    Box from, to;
+    BoxMotion motion;
+  };
+  std::vector<Box> from, to;
+  std::vector<Eigen::Vector2d> expected;
+  for (const DynamicBox& box : boxes_) {
+    for (const DynamicBox& before : last_boxes_) {
+      if (before.box.track_id != box.box.track_id) continue;
+      from.push_back(before.box.box);
+      to.push_back(box.box.box);
+      expected.emplace_back(to.back().CenterX() - from.back().CenterX(),
+                            to.back().CenterY() - from.back().CenterY());
+    }
+  }
+  const std::vector<std::vector<PointMotion>> shared = ShareMotions(from, expected, flow.motions());
+  std::vector<Mover> movers;
+  for (size_t k = 0; k < from.size(); ++k) {
+    if (const auto motion = MotionOfBox(from[k], shared[k])) movers.push_back({from[k], to[k], *motion});
+  }
+  if (movers.empty()) return;
+
+  const Rigid3 frame_from_last = frame->cam_from_world * last.cam_from_world.Inverse();
+  const Eigen::Matrix3d rotation = frame_from_last.Matrix();
+  for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
+    if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
+    const Keypoint& before = last.features.keypoints[flow.last_keypoints()[i]];
+    const Keypoint& now = frame->features.keypoints[i];
+    const Eigen::Vector2d px(now.x, now.y), before_px(before.x, before.y);
+    // At rest, it lies on the epipolar line between where infinity and the nearest depth go.
+    const Eigen::Vector3d ray = camera_.Unproject(before_px);
+    const Eigen::Vector3d far = rotation * ray;
+    const Eigen::Vector3d near = kNearestDepthRatio * median_depth * far + frame_from_last.translation;
+    if (far.z() <= 0 || near.z() <= 0) continue;
+    const Eigen::Vector2d far_px = camera_.Project(far), near_px = camera_.Project(near);
+    // Noise of both ends.
+    const double sigma_px =
+        std::numbers::sqrt2 * octave_scales_[static_cast<size_t>(std::max(now.octave, before.octave))];
+    const double rest_error_px = DistanceToSegment(px, far_px, near_px);
+    const double length_px = (near_px - far_px).norm();
+    const double log_rest = -0.5 * Square(rest_error_px / sigma_px) -
+                            std::log(2 * std::numbers::pi * sigma_px * sigma_px) -
+                            std::log1p(length_px / (std::sqrt(2 * std::numbers::pi) * sigma_px));
+    double evidence = 0;
+    for (const Mover& mover : movers) {
+      const double ring_px = kReach * std::sqrt(mover.to.Area());
+      if (!Contains(mover.to, now.raw_x, now.raw_y, ring_px)) continue;
+      const Eigen::Vector2d center(mover.from.CenterX(), mover.from.CenterY());
+      const Eigen::Vector2d raw_before(before.raw_x, before.raw_y);
+      const Eigen::Vector2d moved_px =
+          before_px + mover.motion.shift_px + (mover.motion.scale - 1) * (raw_before - center);
+      const double apart_px = DistanceToSegment(moved_px, far_px, near_px);
+      // Limbs swing to and fro beside the body.
+      const double mover_sigma_px = std::max(sigma_px, kLimbs * apart_px);
+      // Who moves as what is at rest does gives no evidence: people stand still for a while.
+      if (apart_px < kApart * sigma_px) continue;
+      const double log_moves = -0.5 * Square((px - moved_px).norm() / mover_sigma_px) -
+                               std::log(2 * std::numbers::pi * mover_sigma_px * mover_sigma_px);
+      const double ratio =
+          std::log(std::exp(log_rest) + kMismatch) - std::log(std::exp(log_moves) + kMismatch);
+      evidence = std::abs(ratio) > std::abs(evidence) ? ratio : evidence;
+    }
+    float& odds = frame->motion_log_odds[i];
+    odds = std::clamp(odds + static_cast<float>(std::clamp(evidence, -kMostEvidence, kMostEvidence)),
+                      -kMaxStaticLogOdds, kMaxStaticLogOdds);
+    frame->static_probability[i] = Combine(prior_[i], odds);
+  }
 }
 
 }  // namespace dynamic_slam

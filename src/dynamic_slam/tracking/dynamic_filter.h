@@ -3,9 +3,11 @@
 #include <span>
 #include <vector>
 
+#include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/semantics/dynamic_score.h"
 #include "dynamic_slam/tracking/dynamic_options.h"
+#include "dynamic_slam/tracking/keypoint_flow.h"
 
 namespace dynamic_slam {
 
@@ -21,32 +23,38 @@ struct DynamicKeypoints {
 // How far the frame's keypoints can be trusted to show something at rest.
 class DynamicFilter {
  public:
-  explicit DynamicFilter(const DynamicOptions& options) : options_(options) {}
+  DynamicFilter(const Camera& camera, const DynamicOptions& options, std::vector<float> octave_scales);
 
-  // Fills in frame->static_probability. boxes: all objects of the frame; only dynamic ones count.
-  DynamicKeypoints Judge(std::span<const DynamicBox> boxes, Frame* frame);
+  // Fills in frame->static_probability. boxes: all objects of the frame; only dynamic ones count. flow: from
+  // the last frame to this one, matched with Boxes() of the last one.
+  DynamicKeypoints Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow, const Frame& last,
+                         Frame* frame);
 
-  // P(a keypoint at this place (raw px) shows something at rest), by the boxes of the last Judge.
-  float PriorAt(double raw_x, double raw_y) const;
+  // When the pose is known: which keypoints in and around boxes moved as what is at rest does, and which as
+  // the object. Changes frame->static_probability.
+  void Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame);
 
-  bool HasBoxes() const { return !boxes_.empty(); }
+  // The dynamic boxes of the last Judge.
+  std::vector<Box> Boxes() const;
 
-  // Whether the place is in a dynamic box of the last Judge.
-  bool IsInBox(double raw_x, double raw_y) const;
+  // Whether a point of the frame (ideal px) is in one of its dynamic boxes.
+  bool IsHidden(const Eigen::Vector2d& ideal_px) const;
 
-  // What a frame adds to the log-odds of a landmark that was matched with a keypoint, and fits the pose or not.
+  // What a frame adds to the log-odds of a landmark that was matched with a keypoint, and fits the pose or
+  // not.
   float Evidence(float static_probability, bool fits) const;
-  static constexpr float kMaxLogOdds = 4;
 
   const DynamicOptions& options() const { return options_; }
 
  private:
-  DynamicOptions options_;
-  std::vector<DynamicBox> boxes_;
-};
+  void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
+  float Combine(float prior, float motion_log_odds) const;
 
-// P(at rest) of a match: of a keypoint, and the log-odds of the landmark that it shows. It is the match's weight
-// in the optimisation of poses.
-double TrustInMatch(float static_probability, float static_log_odds);
+  Camera camera_;
+  DynamicOptions options_;
+  std::vector<float> octave_scales_;
+  std::vector<DynamicBox> boxes_, last_boxes_;
+  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
+};
 
 }  // namespace dynamic_slam

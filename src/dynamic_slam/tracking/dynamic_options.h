@@ -16,7 +16,9 @@ struct DynamicOptions {
 
   std::string method = "weights";
   double object_share = 0.8;
+  double margin_ratio = 0.02;
   double missed_object = 0.05;
+  bool motion = true;
   bool landmark_odds = true;
   bool more_features = true;
   bool shield_hidden = true;
@@ -26,14 +28,19 @@ struct DynamicOptions {
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("method", self.method,
-          OptionField{"", 0, 0,
-                      "What is made of the keypoints in dynamic boxes: all used, none, those that move like the "
-                      "static ones around (Algorithm 2), or each weighed by how likely it is at rest.",
-                      kMethods});
+          OptionField{
+              "", 0, 0,
+              "What is made of the keypoints in dynamic boxes: all used, none, those that move like the "
+              "static ones around (Algorithm 2), or each weighed by how likely it is at rest.",
+              kMethods});
     visit("object_share", self.object_share,
           OptionField{"", 0, 1, "Of the keypoints in a box, the part that belongs to the object (weights)."});
+    visit("margin_ratio", self.margin_ratio,
+          OptionField{"", 0, 1, "By how much of its side an object may reach out of its box (weights)."});
     visit("missed_object", self.missed_object,
           OptionField{"", 0.001, 0.5, "P(moves) of a keypoint in no box (weights)."});
+    visit("motion", self.motion,
+          OptionField{"", 0, 1, "Keypoints in and around boxes are judged by how they move (weights)."});
     visit("landmark_odds", self.landmark_odds,
           OptionField{"", 0, 1, "Landmarks gather evidence for being at rest over frames (weights)."});
     visit("more_features", self.more_features,

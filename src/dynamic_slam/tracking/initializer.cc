@@ -107,8 +107,9 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
   const double min_matches = std::max(static_cast<double>(options_.min_matches),
                                       options_.min_match_ratio * static_cast<double>(most_matches_));
   if (static_cast<double>(matches.size()) < min_matches) {
-    reason_ = fmt::format("initialising: {} matches < {:.0f} with the first view; starting again from this one",
-                          matches.size(), min_matches);
+    reason_ =
+        fmt::format("initialising: {} matches < {:.0f} with the first view; starting again from this one",
+                    matches.size(), min_matches);
     StartFrom(frame);
     return std::nullopt;
   }

@@ -67,7 +67,7 @@ class Initializer {
   std::vector<float> octave_scales_;
   std::optional<Frame> reference_;
   InitialViews views_;
-  size_t most_matches_ = 0;  // of any frame with the reference
+  size_t most_matches_ = 0;                   // of any frame with the reference
   std::vector<Eigen::Vector2f> last_places_;  // of the reference's keypoints, px
   std::string reason_;
 };

@@ -11,6 +11,11 @@ namespace {
 constexpr double kWindowRatio = 0.8;
 constexpr double kKeyframeRatio = 0.85;
 
+// Where somebody may stand before the landmark, any corner may be found in its place.
+int MaxDistance(const Frame& frame, uint32_t keypoint) {
+  return frame.static_probability[keypoint] < kMinStaticProbability ? kStrictDistance : kLooseDistance;
+}
+
 }  // namespace
 
 PoseTracker::PoseTracker(const Camera& camera, const TrackerOptions& options,
@@ -41,7 +46,7 @@ int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_f
                               last_keypoint.octave + 1};
     const WindowMatch match =
         FindInWindow(frame->features, frame->grid, window, last.features.descriptors[i], taken_);
-    if (match.distance > kLooseDistance) continue;
+    if (!match.Found() || match.distance > MaxDistance(*frame, match.keypoint)) continue;
     taken_[match.keypoint] = 1;
     candidates_.push_back({match.keypoint, last.landmarks[i], last.points[i], last.static_log_odds[i]});
     rotation_.Add(last_keypoint.angle_rad, frame->features.keypoints[match.keypoint].angle_rad);
@@ -122,7 +127,7 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
                               static_cast<float>(radius_px) * scale, projection.octave - 1,
                               projection.octave + 1};
     const WindowMatch match = FindInWindow(frame->features, frame->grid, window, view.descriptors[i], taken_);
-    if (match.distance > kLooseDistance) continue;
+    if (!match.Found() || match.distance > MaxDistance(*frame, match.keypoint)) continue;
     if (match.octave == match.second_octave && match.distance > kWindowRatio * match.second_distance)
       continue;
     taken_[match.keypoint] = 1;

@@ -54,7 +54,8 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       extractor_(orb, camera),
       initializer_(camera, options.initializer, octave_scales_),
       pose_tracker_(camera, options, octave_scales_),
-      filter_(dynamic),
+      filter_(camera, dynamic, octave_scales_),
+      flow_(camera, octave_scales_),
       seed_(seed),
       random_(seed) {}
 
@@ -70,17 +71,17 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
   frame_.grid.Build(frame_.features, bounds_);
-  frame_.static_probability.assign(frame_.features.size(), 1.0f);
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
   frame_.reference_unit = 1;
+  flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
 }
 
 TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting) {
   DS_TRACE("tracking");
   inliers_ = 0;
   reason_.clear();
-  const DynamicKeypoints judged = filter_.Judge(objects, &frame_);
+  const DynamicKeypoints judged = filter_.Judge(objects, flow_, last_, &frame_);
   share_in_boxes_ = frame_.features.size() == 0
                         ? 0
                         : static_cast<double>(judged.InBoxes()) / static_cast<double>(frame_.features.size());
@@ -94,6 +95,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
     state_ = tracked ? TrackingState::kTracking : TrackingState::kLost;
     if (tracked) {
       lost_frames_ = 0;
+      ++tracked_frames_;
       CountVisibility();
       frame_.reference = view_.reference;
       frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
@@ -104,6 +106,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
         velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
         velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
       }
+      if (last_has_pose_) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
       if (!start_is_certain_) ReviewStart(&result);
       if (state_ == TrackingState::kTracking && !result.map_was_reset) {
         InsertKeyframeIfDue(keyframes_waiting, &result);
@@ -181,6 +184,7 @@ void Tracker::EmptyMap(TrackingResult* result) {
   result->map_was_reset = true;
   result->new_keyframes.clear();
   lost_frames_ = 0;
+  tracked_frames_ = 0;
   inliers_ = 0;
 }
 
@@ -309,13 +313,22 @@ bool Tracker::Relocalise() {
   return false;
 }
 
+// Of the landmarks that the frame shows.
+double Tracker::MedianDepthOfFrame() const {
+  std::vector<double> depths;
+  for (size_t i = 0; i < frame_.landmarks.size(); ++i) {
+    if (frame_.landmarks[i].IsValid()) depths.push_back((frame_.cam_from_world * frame_.points[i]).z());
+  }
+  return depths.empty() ? 0 : Median(&depths);
+}
+
 void Tracker::CountVisibility() {
   for (size_t i = 0; i < view_.size(); ++i) {
     if (in_view_[i] == 0) continue;
-    if (filter_.options().shield_hidden && filter_.HasBoxes()) {
-      const Eigen::Vector2d px = camera_.Distort(camera_.Project(frame_.cam_from_world * view_.positions[i]));
-      // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
-      if (filter_.IsInBox(px.x(), px.y())) continue;
+    // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
+    if (filter_.options().shield_hidden &&
+        filter_.IsHidden(camera_.Project(frame_.cam_from_world * view_.positions[i]))) {
+      continue;
     }
     visibility_.visible.push_back(view_.ids[i]);
   }
@@ -343,7 +356,7 @@ void VisibilityLog::ApplyTo(Map* map) {
     const LandmarkId now = map->Resolve(id);
     if (!now.IsValid()) continue;
     float& odds = map->landmarks().At(now).static_log_odds;
-    odds = std::clamp(odds + evidence, -DynamicFilter::kMaxLogOdds, DynamicFilter::kMaxLogOdds);
+    odds = std::clamp(odds + evidence, -kMaxStaticLogOdds, kMaxStaticLogOdds);
   }
   Clear();
 }
@@ -381,7 +394,9 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
 void Tracker::GiveUpSmallMap(TrackingResult* result) {
   if (lost_frames_ < options_.reset_after_frames) return;
   const size_t keyframes = map_->Read()->keyframes().size();
-  if (static_cast<int>(keyframes) > options_.reset_keyframes) return;
+  const bool is_small = static_cast<int>(keyframes) <= options_.reset_keyframes;
+  const bool is_young = lost_frames_ > tracked_frames_ && tracked_frames_ < options_.young_map_frames;
+  if (!is_small && !is_young) return;
   reason_ =
       fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_, keyframes);
   EmptyMap(result);

@@ -74,7 +74,11 @@ class Tracker {
   // The rotation that the motion model expects since the last frame, x_in_this = R x_in_last; after Extract.
   std::optional<Eigen::Quaterniond> PredictedRotation() const;
 
-  // Finds the pose of the frame. objects: what is in it. keyframes_waiting: those that local mapping has not come to yet.
+  // How keypoints in and around dynamic boxes moved since the last frame; after Extract.
+  const std::vector<PointMotion>& Motions() const { return flow_.motions(); }
+
+  // Finds the pose of the frame. objects: what is in it. keyframes_waiting: those that local mapping has not
+  // come to yet.
   TrackingResult Track(std::span<const DynamicBox> objects = {}, int keyframes_waiting = 0);
 
   // The rotation that was found; none without a pose in this frame or the last.
@@ -99,6 +103,7 @@ class Tracker {
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
   std::optional<Rigid3> PredictMotion() const;
+  double MedianDepthOfFrame() const;
   void CountVisibility();
   void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
   void GiveUpSmallMap(TrackingResult* result);
@@ -113,6 +118,7 @@ class Tracker {
   Initializer initializer_;
   PoseTracker pose_tracker_;
   DynamicFilter filter_;
+  KeypointFlow flow_;
   double share_in_boxes_ = 0;  // of the last frame's keypoints, those in dynamic boxes
   LocalViewBuilder view_builder_;
   uint64_t seed_;
@@ -128,6 +134,7 @@ class Tracker {
   FrameId last_keyframe_frame_;
   FrameId start_frame_;
   int lost_frames_ = 0;
+  int tracked_frames_ = 0;  // in this map
   int inliers_ = 0;
   int most_inliers_ = 0;  // since the last keyframe
   std::string reason_;

@@ -75,6 +75,7 @@ struct TrackerOptions {
   int relocalisation_keyframes = 20;
   int reset_keyframes = 5;
   int reset_after_frames = 15;
+  int young_map_frames = 150;
   InitializerOptions initializer;
   KeyframePolicyOptions keyframe;
   PoseOptimizerOptions pose;
@@ -104,6 +105,11 @@ struct TrackerOptions {
         OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
     visit("reset_after_frames", self.reset_after_frames,
           OptionField{"", 1, 10000, "Lost frames after which such a small map is given up."});
+    visit(
+        "young_map_frames", self.young_map_frames,
+        OptionField{"", 0, 100000,
+                    "A map of less tracked frames is given up when the camera has been lost for longer than "
+                    "that."});
     visit("initializer", self.initializer);
     visit("keyframe", self.keyframe);
     visit("pose", self.pose);

@@ -1,0 +1,63 @@
+#include "dynamic_slam/tracking/keypoint_flow.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamic_slam/features/matcher.h"
+
+namespace dynamic_slam {
+namespace {
+
+// What an object or the camera's translation adds to the rotation from one frame to the next; a person who
+// walks past at 2 m, at 30 frames a second, moves by less.
+constexpr float kRadiusPx = 20;
+
+// Nearest over second nearest distance.
+constexpr double kRatio = 0.8;
+
+// Around a box as much as selective tracking looks at (SelectiveOptions::ring_ratio).
+constexpr double kRing = 0.25;
+
+}  // namespace
+
+void KeypointFlow::Clear(const Frame& frame) {
+  last_keypoints_.assign(frame.features.size(), kNone);
+  distances_.assign(frame.features.size(), kStrictDistance + 1);
+  motions_.clear();
+}
+
+void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
+                         const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame) {
+  Clear(frame);
+  if (boxes.empty()) return;
+  const Eigen::Matrix3d rotation =
+      frame_from_last.value_or(Eigen::Quaterniond::Identity()).toRotationMatrix();
+  for (uint32_t i = 0; i < last.features.size(); ++i) {
+    const Keypoint& from = last.features.keypoints[i];
+    const bool is_near = std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
+      const double ring_px = kRing * std::sqrt(box.Area());
+      return Box{box.x - ring_px, box.y - ring_px, box.width + 2 * ring_px, box.height + 2 * ring_px}
+          .Contains(from.raw_x, from.raw_y);
+    });
+    if (!is_near) continue;
+    const Eigen::Vector3d ray = rotation * camera_.Unproject({from.x, from.y});
+    if (ray.z() <= 0) continue;
+    const Eigen::Vector2d px = camera_.Project(ray);
+    const SearchWindow window{static_cast<float>(px.x()), static_cast<float>(px.y()), kRadiusPx,
+                              from.octave - 1, from.octave + 1};
+    const WindowMatch match =
+        FindInWindow(frame.features, frame.grid, window, last.features.descriptors[i], {});
+    if (!match.Found() || match.distance >= distances_[match.keypoint]) continue;
+    if (match.distance > kRatio * match.second_distance && match.octave == match.second_octave) continue;
+    distances_[match.keypoint] = match.distance;
+    last_keypoints_[match.keypoint] = i;
+  }
+  for (uint32_t i = 0; i < last_keypoints_.size(); ++i) {
+    if (last_keypoints_[i] == kNone) continue;
+    const Keypoint& from = last.features.keypoints[last_keypoints_[i]];
+    const Keypoint& to = frame.features.keypoints[i];
+    motions_.push_back({{from.raw_x, from.raw_y}, {to.raw_x, to.raw_y}});
+  }
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/map/frame.h"
+#include "dynamic_slam/semantics/point_motion.h"
+
+namespace dynamic_slam {
+
+// Where keypoints of one frame are in the next one, matched by descriptors about where the camera's rotation
+// takes them. Only in and around the given boxes: elsewhere landmarks tell more.
+class KeypointFlow {
+ public:
+  static constexpr uint32_t kNone = 0xffffffffu;
+
+  KeypointFlow(const Camera& camera, std::vector<float> octave_scales)
+      : camera_(camera), octave_scales_(std::move(octave_scales)) {}
+
+  // boxes: of objects in the last frame, px of the raw image. frame_from_last: x_in_frame = R x_in_last.
+  void Match(const Frame& last, std::span<const Box> boxes,
+             const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame);
+
+  // No matches.
+  void Clear(const Frame& frame);
+
+  // For each keypoint of the frame the one of the last frame, or kNone.
+  const std::vector<uint32_t>& last_keypoints() const { return last_keypoints_; }
+
+  // The same as motions, px of the raw image.
+  const std::vector<PointMotion>& motions() const { return motions_; }
+
+ private:
+  Camera camera_;
+  std::vector<float> octave_scales_;
+  std::vector<uint32_t> last_keypoints_;
+  std::vector<int> distances_;
+  std::vector<PointMotion> motions_;
+};
+
+}  // namespace dynamic_slam
