@@ -220,14 +220,14 @@ TEST(PlantedTest, AnEpochThatIsReadTooLateIsFound) {
   const auto goes_wrong = [&](uint64_t seed, bool planted) {
     SharedMap map(OctaveScales(options.orb));
     const Camera camera = SmallRoom::SmallCamera();
-    Tracker tracker(camera, options.orb, options.tracker, options.seed, &map);
+    Tracker tracker(camera, options.orb, options.tracker, options.dynamic, options.seed, &map);
     LocalMapper mapper(camera, options.mapper, &map);
     ShuffledExecutor executor(seed);
     try {
       for (int i = 0; i < 16; ++i) {
         tracker.Extract(FrameId(static_cast<uint32_t>(i)), room.Stamp(i),
                         i < 12 ? room.image(i) : SmallRoom::BlackImage(), {});
-        const TrackingResult result = tracker.Track(executor.Waiting(Lane::kMapping));
+        const TrackingResult result = tracker.Track({}, executor.Waiting(Lane::kMapping));
         for (const KeyframeId keyframe : result.new_keyframes) {
           executor.Post(Lane::kMapping,
                         [&, planted, keyframe, epoch = result.map_epoch](const std::stop_token&) {

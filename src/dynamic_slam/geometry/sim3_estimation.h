@@ -21,7 +21,7 @@ struct Sim3Match {
 };
 
 struct Sim3Options {
-  int min_inliers = 15;
+  int min_inliers = 10;
   double chi2 = 9.21;
   double ransac_confidence = 0.999;
   int max_ransac_iterations = 500;

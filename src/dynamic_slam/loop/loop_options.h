@@ -10,7 +10,7 @@ struct LoopOptions {
   int max_candidates = 3;
   double min_score_ratio = 0.2;
   int covisible_weight = 15;
-  int min_matches = 20;
+  int min_matches = 15;
   int min_inliers = 40;
   int min_confirming_keyframes = 2;
   int min_confirming_inliers = 15;
