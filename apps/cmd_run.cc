@@ -18,6 +18,7 @@
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
+#include "mask_folder.h"
 #include "overlay_writer.h"
 #include "run_console.h"
 #include "source_arguments.h"
@@ -36,27 +37,11 @@ struct RunArguments {
   std::string out;
   std::string trace;
   std::string models;
-  std::string overlay;
+  std::string overlay, masks, export_masks;
   std::optional<double> detector_latency_ms;
   FrameSourceOptions source_options;
   bool quiet = false;
 };
-
-Camera ChooseCamera(const RunArguments& arguments, const FrameSource& source) {
-  Camera camera;
-  if (!arguments.camera.empty()) {
-    camera = LoadCamera(arguments.camera);
-  } else if (const std::optional<Camera> own = source.OwnCamera(); own.has_value()) {
-    camera = *own;
-  } else {
-    std::string known;
-    for (const std::string& name : KnownCameras()) known += (known.empty() ? "" : ", ") + name;
-    throw InputError(arguments.source, "has no camera file of its own",
-                     fmt::format("Give one with --camera FILE, or --camera NAME with one of: {}.", known));
-  }
-  CheckCameraFits(camera, arguments.camera.empty() ? arguments.source : arguments.camera, source.ImageSize());
-  return camera;
-}
 
 std::filesystem::path OutputFolder(const RunArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
@@ -84,7 +69,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (arguments.detector_latency_ms) options.detector.latency_ms = *arguments.detector_latency_ms;
   const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
-  const Camera camera = ChooseCamera(arguments, *source);
+  const Camera camera = ChooseCamera(arguments.camera, arguments.source, *source);
   const std::filesystem::path out = OutputFolder(arguments);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
   system.SetDetector(detector);
@@ -92,15 +77,29 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   RunConsole console(arguments.quiet);
   RunControl control = console.Control();
+  std::optional<MaskFolder> masks;
+  if (!arguments.masks.empty()) {
+    if (!std::filesystem::is_directory(arguments.masks)) {
+      throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
+    }
+    control.mask = [folder =
+                        MaskFolder(arguments.masks, cv::Size(system.camera().width, system.camera().height))](
+                       const SourceImage& image) { return folder.Read(image); };
+  }
+  if (!arguments.export_masks.empty()) {
+    PrepareOutputFolder(arguments.export_masks);
+    masks.emplace(arguments.export_masks, cv::Size(system.camera().width, system.camera().height));
+  }
   std::optional<OverlayWriter> overlay;
   if (!arguments.overlay.empty()) {
     overlay.emplace(arguments.overlay, camera, options.image,
                     detector == nullptr ? std::vector<std::string>() : detector->class_names());
-    control.on_frame = [&console, &overlay](const RunProgress& progress) {
-      console.Show(progress);
-      overlay->Write(progress);
-    };
   }
+  control.on_frame = [&](const RunProgress& progress) {
+    console.Show(progress);
+    if (overlay.has_value()) overlay->Write(progress);
+    if (masks.has_value()) masks->Write(*progress.image, *progress.result);
+  };
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = arguments.source;
   console.End();
@@ -139,6 +138,10 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--overlay", a.overlay,
                       "Folder for the frames with their objects: detected red, compensated green");
+  command->add_option("--masks", a.masks,
+                      "Folder with a mask for each image, NAME.png: no keypoints where it is not 0");
+  command->add_option("--export-masks", a.export_masks,
+                      "Folder for the masks of the dynamic objects (Eq. 11)");
   command
       ->add_option("--mode", a.mode,
                    "offline: every frame, reproducible. realtime: at the pace of the time stamps; "

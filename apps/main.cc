@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "cmd_bench.h"
 #include "cmd_config.h"
 #include "cmd_demo.h"
 #include "cmd_detect.h"
@@ -33,6 +34,7 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddModelsCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);
+  dynamic_slam::AddBenchCommand(app, &exit_code);
   dynamic_slam::AddConfigCommand(app);
   try {
     app.parse(argc, argv);  // runs the subcommand

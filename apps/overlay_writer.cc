@@ -11,8 +11,8 @@
 namespace dynamic_slam {
 namespace {
 
-// Fig. 7, 11 and 13: what the pose rests on is drawn full, in a dynamic box yellow; what is not trusted is a red
-// dot, the rest a grey one.
+// Fig. 7, 11 and 13: what the pose rests on is drawn full, in a dynamic box yellow; what is not trusted is a
+// red dot, the rest a grey one.
 void DrawKeypoints(const Frame& frame, cv::Mat* picture) {
   const cv::Scalar used(90, 220, 90), kept(0, 220, 255), culled(60, 60, 230), unused(150, 150, 150);
   for (size_t i = 0; i < frame.features.size(); ++i) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include <CLI/CLI.hpp>
 
 #include "dynamic_slam/io/frame_source.h"
@@ -14,5 +16,10 @@ inline void AddSourceOptions(CLI::App* command, FrameSourceOptions* options) {
   command->add_option("--fps", options->fps, "Frames a second of a folder of images (30) or a video")
       ->check(CLI::NonNegativeNumber);
 }
+
+// The camera of a name or file, or, when that is empty, the one that the source describes itself. Throws
+// InputError when there is none, or it does not fit the images.
+Camera ChooseCamera(const std::string& name_or_file, const std::string& source_name,
+                    const FrameSource& source);
 
 }  // namespace dynamic_slam

@@ -72,6 +72,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   } else {
     json["detector"] = {{"name", summary.detector}};
   }
+  json["dynamic_keypoints"] = {{"mean_ratio", summary.mean_dynamic_ratio}};
   json["final_bundle"] = {{"done", summary.final_bundle.usable},
                           {"stopped", summary.final_bundle.stopped},
                           {"iterations", summary.final_bundle.iterations},
@@ -90,11 +91,14 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
 }
 
 std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
-  std::string csv = "timestamp,state,keypoints,inliers,keyframe,detection,objects,tracking_ms,reason\n";
+  std::string csv =
+      "timestamp,state,keypoints,inliers,keyframe,detection,objects,static,dynamic,culled,kept,tracking_ms,"
+      "reason\n";
   for (const RunSummary::FrameRecord& frame : frames) {
-    csv += fmt::format("{:.9f},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s, Name(frame.state),
-                       frame.keypoints, frame.inliers, Name(frame.keyframe_reason), Name(frame.detection),
-                       frame.objects, frame.tracking_ms, frame.reason);
+    csv += fmt::format("{:.9f},{},{},{},{},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s,
+                       Name(frame.state), frame.keypoints, frame.inliers, Name(frame.keyframe_reason),
+                       Name(frame.detection), frame.objects, frame.dynamic.outside, frame.dynamic.InBoxes(),
+                       frame.dynamic.culled, frame.dynamic.kept, frame.tracking_ms, frame.reason);
   }
   return csv;
 }

@@ -37,6 +37,7 @@ struct RunSummary {
   LoopReport loops;
   std::string detector = "none";
   std::optional<DetectionReport> detection;  // of the detector, if there is one
+  double mean_dynamic_ratio = 0;             // keypoints in dynamic boxes over all, mean over frames
   int most_keyframes_waiting = 0;            // for local mapping, at any time
   BundleSummary final_bundle;
   double startup_s = 0;  // from the start of the process to the first frame
@@ -55,6 +56,7 @@ struct RunSummary {
     KeyframeReason keyframe_reason = KeyframeReason::kNone;
     DetectionState detection = DetectionState::kOff;
     size_t objects = 0;  // seen or believed to be in the frame
+    DynamicKeypoints dynamic;
     double tracking_ms = 0;
     std::string reason;
   };

@@ -60,7 +60,11 @@ class FrameLog {
     summary_->most_keyframes_waiting = std::max(summary_->most_keyframes_waiting, result.keyframes_waiting);
     summary_->frames.push_back({timestamp_s, tracking.state, tracking.keypoints, tracking.inliers,
                                 tracking.keyframe_reason, result.objects.state, result.objects.boxes.size(),
-                                result.tracking_ms, tracking.reason});
+                                tracking.dynamic, result.tracking_ms, tracking.reason});
+    if (tracking.keypoints > 0) {
+      dynamic_ratios_ += static_cast<double>(tracking.dynamic.InBoxes()) / tracking.keypoints;
+      summary_->mean_dynamic_ratio = dynamic_ratios_ / static_cast<double>(summary_->frames.size());
+    }
     summary_->last_reason = is_tracking ? "" : tracking.reason;
   }
 
@@ -69,6 +73,7 @@ class FrameLog {
  private:
   RunSummary* summary_;
   std::vector<double> tracking_ms_;
+  double dynamic_ratios_ = 0;  // their sum
   bool was_tracking_ = false;
 };
 
@@ -105,10 +110,12 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
         summary.skipped.push_back({image->name, reason});
         continue;
       }
-      const FrameResult result = system.Process(image->timestamp_s, image->image);
+      const FrameResult result =
+          system.Process(image->timestamp_s, image->image, control.mask ? control.mask(*image) : cv::Mat());
       log.Add(image->timestamp_s, result);
       if (control.on_frame)
-        control.on_frame({summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map()});
+        control.on_frame(
+            {summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map()});
     }
     end_feed();
     if (summary.interrupted) system.Stop();

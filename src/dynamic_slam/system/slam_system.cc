@@ -61,8 +61,8 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   }
   tracker_.Extract(result.id, timestamp_s, grey_, preparer_.MergedMask(mask));
   if (detection_.has_value()) {
-    result.objects = detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation(),
-                                         tracker_.Motions());
+    result.objects =
+        detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation(), tracker_.Motions());
   }
   result.tracking = tracker_.Track(result.objects.boxes, executor_->Waiting(Lane::kMapping));
   if (const auto rotation = tracker_.Rotation(); rotation.has_value() && detection_.has_value()) {

@@ -90,6 +90,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
                         : static_cast<double>(judged.InBoxes()) / static_cast<double>(frame_.features.size());
 
   TrackingResult result;
+  result.dynamic = judged;
   result.keypoints = static_cast<int>(frame_.features.size());
   if (state_ == TrackingState::kInitialising) {
     Initialise(&result);

@@ -35,6 +35,7 @@ struct TrackingResult {
   TrackingState state = TrackingState::kInitialising;
   std::string reason;  // one sentence with its number; empty while all is well
   int keypoints = 0;
+  DynamicKeypoints dynamic;
   int inliers = 0;  // landmarks that fit the pose
   KeyframeReason keyframe_reason = KeyframeReason::kNone;
   std::vector<KeyframeId> new_keyframes;     // inserted into the map, waiting for local mapping
