@@ -33,7 +33,7 @@ cv::Mat MaskFolder::Read(const SourceImage& image) const {
 void MaskFolder::Write(const SourceImage& image, const FrameResult& result) const {
   std::vector<Box> boxes;
   for (const DynamicBox& object : result.objects.boxes) {
-    if (object.is_dynamic) boxes.push_back(object.box.box);
+    if (object.is_dynamic) boxes.push_back(object.box);
   }
   WritePicture(PathOf(image).string(), DynamicMask(boxes, size_.width, size_.height));
 }

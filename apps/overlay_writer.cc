@@ -45,8 +45,7 @@ OverlayWriter::OverlayWriter(std::filesystem::path folder, const Camera& raw_cam
 
 void OverlayWriter::Write(const RunProgress& progress) {
   preparer_.PrepareColour(progress.image->image, &picture_);
-  for (const DynamicBox& dynamic : progress.result->objects.boxes) {
-    const CompensatedBox& object = dynamic.box;
+  for (const DynamicBox& object : progress.result->objects.boxes) {
     const std::string label =
         fmt::format("{} {:.2f}", class_names_[static_cast<size_t>(object.class_id)], object.score);
     DrawBox(object.box, label, object.is_detected ? kDetectedColour : kCompensatedColour, &picture_);

@@ -58,7 +58,7 @@ std::vector<DynamicBox> DynamicScore::Update(std::span<const CompensatedBox> box
 
     double score = 0;
     for (size_t i = 0; i < class_scores_.size(); ++i) score += track.belief[i] * class_scores_[i];
-    result.push_back({box, score / DynamicPrior::kMaxScore, score, score > options_.threshold});  // Eq. (8)
+    result.push_back({{box}, score / DynamicPrior::kMaxScore, score, score > options_.threshold});  // Eq. (8)
   }
   std::erase_if(tracks_, [this](const auto& item) {
     return frame_ - item.second.last_frame >= static_cast<int>(BoxCompensation::kHistoryFrames);

@@ -29,11 +29,10 @@ struct DynamicScoreOptions {
 };
 
 // A box and how dynamic the object in it is.
-struct DynamicBox {
-  CompensatedBox box;
-  double probability = 0;   // P(dynamic | all detections so far)
-  double score = 0;         // the same from 0 (static) to 10 (dynamic), as the paper counts
-  bool is_dynamic = false;  // score > threshold
+struct DynamicBox : CompensatedBox {
+  double probability = 0;    // P(dynamic | all detections so far)
+  double dynamic_score = 0;  // the same from 0 (static) to 10 (dynamic), as the paper counts
+  bool is_dynamic = false;   // dynamic_score > threshold
 };
 
 // Whether the objects in tracked boxes are dynamic, as maximum a posteriori over frames (Eq. 7 to 9).

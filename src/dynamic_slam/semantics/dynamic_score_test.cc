@@ -49,11 +49,11 @@ TEST(DynamicScoreTest, ResultsCarryTheirBoxes) {
   DynamicScore score = TwoClasses();
   const auto boxes = score.Update(std::vector{BoxOf(3, kMover), BoxOf(5, kThing)});
   ASSERT_EQ(boxes.size(), 2u);
-  EXPECT_EQ(boxes[0].box.track_id, 3);
-  EXPECT_EQ(boxes[0].box.box.width, 30);
-  EXPECT_NEAR(boxes[0].score, 9.9, 1e-12);
+  EXPECT_EQ(boxes[0].track_id, 3);
+  EXPECT_EQ(boxes[0].box.width, 30);
+  EXPECT_NEAR(boxes[0].dynamic_score, 9.9, 1e-12);
   EXPECT_TRUE(boxes[0].is_dynamic);
-  EXPECT_NEAR(boxes[1].score, 0.1, 1e-12);
+  EXPECT_NEAR(boxes[1].dynamic_score, 0.1, 1e-12);
   EXPECT_FALSE(boxes[1].is_dynamic);
   EXPECT_TRUE(score.Update({}).empty());
 }
@@ -89,34 +89,34 @@ TEST_F(ManyClasses, TheFirstDetectionDecidesByItsClass) {
     score_.Reset();
     const DynamicBox box = See(class_id, 1, 0.4);
     EXPECT_EQ(box.is_dynamic, is_dynamic) << class_id;
-    EXPECT_NEAR(box.score, scores_[static_cast<size_t>(class_id)], 0.2);
+    EXPECT_NEAR(box.dynamic_score, scores_[static_cast<size_t>(class_id)], 0.2);
   }
 }
 
-TEST_F(ManyClasses, ACarThatIsSeenAHundredTimesIsStillACar) { EXPECT_NEAR(See(kCar, 100).score, 6, 0.1); }
+TEST_F(ManyClasses, ACarThatIsSeenAHundredTimesIsStillACar) { EXPECT_NEAR(See(kCar, 100).dynamic_score, 6, 0.1); }
 
 TEST_F(ManyClasses, AFewWrongLabelsDoNotFlipALastingChangeDoes) {
   See(kPerson, 10);
-  EXPECT_GT(See(kChair, 3).score, 9);
-  EXPECT_GT(See(kPerson, 3).score, 9.8);
+  EXPECT_GT(See(kChair, 3).dynamic_score, 9);
+  EXPECT_GT(See(kPerson, 3).dynamic_score, 9.8);
   const DynamicBox chair = See(kChair, 15);
-  EXPECT_NEAR(chair.score, 3, 0.3);
+  EXPECT_NEAR(chair.dynamic_score, 3, 0.3);
   EXPECT_FALSE(chair.is_dynamic);
   EXPECT_TRUE(See(kPerson, 15).is_dynamic) << "and back";
 }
 
 TEST_F(ManyClasses, AFlipBetweenMoversIsNoFlip) {
   for (int i = 0; i < 10; ++i) {
-    EXPECT_GT(See(kPerson, 1).score, 8.5);
-    EXPECT_GT(See(kDog, 1).score, 8.5);
+    EXPECT_GT(See(kPerson, 1).dynamic_score, 8.5);
+    EXPECT_GT(See(kDog, 1).dynamic_score, 8.5);
   }
 }
 
 TEST_F(ManyClasses, AMissedDetectionChangesNothing) {
-  const double seen = See(kPerson, 5).score;
+  const double seen = See(kPerson, 5).dynamic_score;
   for (int missed = 1; missed <= 30; ++missed) {
     const auto boxes = score_.Update(std::vector{BoxOf(1, kPerson, 0.3, missed)});
-    EXPECT_EQ(boxes.at(0).score, seen);
+    EXPECT_EQ(boxes.at(0).dynamic_score, seen);
   }
 }
 

@@ -73,12 +73,12 @@ bool DynamicFilter::IsHidden(const Eigen::Vector2d& ideal_px) const {
   if (boxes_.empty()) return false;
   const Eigen::Vector2d px = camera_.Distort(ideal_px);
   return std::any_of(boxes_.begin(), boxes_.end(),
-                     [&](const DynamicBox& box) { return box.box.box.Contains(px.x(), px.y()); });
+                     [&](const DynamicBox& box) { return box.box.Contains(px.x(), px.y()); });
 }
 
 std::vector<Box> DynamicFilter::Boxes() const {
   std::vector<Box> boxes;
-  for (const DynamicBox& box : boxes_) boxes.push_back(box.box.box);
+  for (const DynamicBox& box : boxes_) boxes.push_back(box.box);
   return boxes;
 }
 
@@ -112,7 +112,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
     double at_rest = 1;
     for (const DynamicBox& box : boxes_) {
-      const Box& b = box.box.box;
+      const Box& b = box.box;
       const double margin_px = weights ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
       if (!Contains(b, keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
       in_box[i] = 1;
@@ -168,9 +168,9 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
   std::vector<Eigen::Vector2d> expected;
   for (const DynamicBox& box : boxes_) {
     for (const DynamicBox& before : last_boxes_) {
-      if (before.box.track_id != box.box.track_id) continue;
-      from.push_back(before.box.box);
-      to.push_back(box.box.box);
+      if (before.track_id != box.track_id) continue;
+      from.push_back(before.box);
+      to.push_back(box.box);
       expected.emplace_back(to.back().CenterX() - from.back().CenterX(),
                             to.back().CenterY() - from.back().CenterY());
     }
