@@ -28,10 +28,14 @@ struct Frame {
   Rigid3 cam_from_reference;
   double reference_unit = 1;  // Keyframe::unit of the reference, when the pose was found
 
+  float StaticProbability(size_t keypoint) const {  // 1 where nothing was said
+    return static_probability.empty() ? 1.0f : static_probability[keypoint];
+  }
+
   void ClearLandmarks() {
     landmarks.assign(features.size(), LandmarkId());
     points.resize(features.size());
-    static_log_odds.resize(features.size());
+    static_log_odds.assign(features.size(), 0.0f);
   }
 };
 

@@ -13,7 +13,7 @@ constexpr double kKeyframeRatio = 0.85;
 
 // Where somebody may stand before the landmark, any corner may be found in its place.
 int MaxDistance(const Frame& frame, uint32_t keypoint) {
-  return frame.static_probability[keypoint] < kMinStaticProbability ? kStrictDistance : kLooseDistance;
+  return frame.StaticProbability(keypoint) < kMinStaticProbability ? kStrictDistance : kLooseDistance;
 }
 
 }  // namespace
@@ -62,7 +62,7 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
     if (keyframe.landmarks()[i].IsValid()) with_landmark.push_back(i);
   }
   for (uint32_t i = 0; i < frame->features.size(); ++i) {
-    if (frame->static_probability[i] > 0) usable.push_back(i);
+    if (frame->StaticProbability(i) > 0) usable.push_back(i);
   }
   const std::vector<Match> matches = MatchMutual(keyframe.features(), with_landmark, frame->features, usable,
                                                  (kStrictDistance + kLooseDistance) / 2, kKeyframeRatio);
@@ -146,7 +146,7 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     const Keypoint& keypoint = frame->features.keypoints[i];
     observations_.Add(frame->points[i], {keypoint.x, keypoint.y},
                       1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)],
-                      TrustInMatch(frame->static_probability[i], frame->static_log_odds[i]));
+                      TrustInMatch(frame->StaticProbability(i), frame->static_log_odds[i]));
     observed_keypoints_.push_back(i);
   }
   rejected_.clear();
@@ -163,7 +163,7 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
 
 void PoseTracker::TakeUnusable(const Frame& frame) {
   taken_.resize(frame.features.size());
-  for (size_t i = 0; i < taken_.size(); ++i) taken_[i] = !(frame.static_probability[i] > 0);
+  for (size_t i = 0; i < taken_.size(); ++i) taken_[i] = !(frame.StaticProbability(i) > 0);
 }
 
 void PoseTracker::AcceptCandidates(Frame* frame) {

@@ -69,11 +69,13 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   const bool is_starting = state_ == TrackingState::kInitialising || !start_is_certain_;
   double factor = is_starting ? options_.initializer.feature_factor : 1.0;
   if (filter_.options().more_features) {
-    factor *= std::min(1 / (1 - share_in_boxes_), is_starting ? kMaxMoreStarting : filter_.options().max_feature_factor);
+    factor *= std::min(1 / (1 - share_in_boxes_),
+                       is_starting ? kMaxMoreStarting : filter_.options().max_feature_factor);
   }
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
   frame_.grid.Build(frame_.features, bounds_);
+  frame_.static_probability.clear();
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
   frame_.reference_unit = 1;

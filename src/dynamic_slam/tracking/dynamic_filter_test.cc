@@ -1,0 +1,185 @@
+#include "dynamic_slam/tracking/dynamic_filter.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/map/static_evidence.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr double kDepth = 3, kShift = 0.06;  // of the scene, and of the camera between the two frames
+
+// A camera that moves to the right past a wall, and a person before it who walks along with the camera: a
+// grid of keypoints, of which those in the box belong in turn to the person and to the wall behind.
+class DynamicFilterTest : public ::testing::Test {
+ protected:
+  DynamicFilterTest() {
+    camera_.width = 640;
+    camera_.height = 480;
+    camera_.fx = camera_.fy = 500;
+    camera_.cx = 320;
+    camera_.cy = 240;
+    const double wall_px = -camera_.fx * kShift / kDepth;  // 10 px to the left
+    for (int row = 0; row < 22; ++row) {
+      for (int col = 0; col < 30; ++col) {
+        const double x = 30 + 20 * col, y = 20 + 20 * row;
+        const bool on_person = Person(0).box.Contains(x, y) && (row + col) % 2 == 0;
+        Add(x, y, x + (on_person ? kPersonPx : wall_px), y, on_person);
+      }
+    }
+    last_.cam_from_world = Rigid3();
+    frame_.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {-kShift, 0, 0});
+    for (Frame* frame : {&last_, &frame_}) {
+      frame->grid.Build(frame->features, camera_.IdealBounds());
+      frame->ClearLandmarks();
+    }
+  }
+
+  static DynamicBox Person(double shift_px) {
+    DynamicBox box;
+    box.box = {200 + shift_px, 100, 160, 300};
+    box.track_id = 1;
+    box.is_detected = true;
+    box.probability = 0.95;
+    box.is_dynamic = true;
+    return box;
+  }
+
+  void Add(double x, double y, double next_x, double next_y, bool on_person) {
+    const Descriptor descriptor{random_.Next(), random_.Next(), random_.Next(), random_.Next()};
+    for (auto& [frame, px, py] : {std::tuple{&last_, x, y}, std::tuple{&frame_, next_x, next_y}}) {
+      Keypoint keypoint;
+      keypoint.x = keypoint.raw_x = static_cast<float>(px);
+      keypoint.y = keypoint.raw_y = static_cast<float>(py);
+      frame->features.keypoints.push_back(keypoint);
+      frame->features.descriptors.push_back(descriptor);
+    }
+    on_person_.push_back(on_person);
+  }
+
+  DynamicFilter Make(const std::string& method) {
+    DynamicOptions options;
+    options.method = method;
+    return DynamicFilter(camera_, options, OctaveScales());
+  }
+
+  // Both frames, the pose known after the second one.
+  DynamicKeypoints Run(DynamicFilter* filter) {
+    flow_.Clear(last_);
+    filter->Judge(std::vector{Person(0)}, flow_, frame_, &last_);
+    flow_.Match(last_, filter->Boxes(), {}, frame_);
+    const DynamicKeypoints counts = filter->Judge(std::vector{Person(kPersonPx)}, flow_, last_, &frame_);
+    filter->Watch(flow_, last_, kDepth, &frame_);
+    return counts;
+  }
+
+  bool IsInBox(size_t i) const {
+    return Person(kPersonPx).box.Contains(frame_.features.keypoints[i].raw_x,
+                                          frame_.features.keypoints[i].raw_y);
+  }
+
+  // Mean P(at rest) over the keypoints in the box that are, or are not, the person's.
+  double MeanInBox(bool on_person) const {
+    double sum = 0, count = 0;
+    for (size_t i = 0; i < on_person_.size(); ++i) {
+      if (!IsInBox(i) || on_person_[i] != on_person) continue;
+      sum += frame_.static_probability[i];
+      ++count;
+    }
+    return sum / count;
+  }
+
+  static std::vector<float> OctaveScales() { return {1.0f, 1.2f}; }
+  static constexpr double kPersonPx = 8;
+
+  Random random_{7};
+  Camera camera_;
+  Frame last_, frame_;
+  KeypointFlow flow_{camera_, OctaveScales()};
+  std::vector<bool> on_person_;
+};
+
+TEST_F(DynamicFilterTest, WithoutDynamicObjectsEverythingIsTrusted) {
+  DynamicFilter filter = Make("weights");
+  DynamicBox chair = Person(0);
+  chair.is_dynamic = false;
+  flow_.Clear(frame_);
+  const DynamicKeypoints counts = filter.Judge(std::vector{chair}, flow_, last_, &frame_);
+  EXPECT_EQ(counts.outside, static_cast<int>(frame_.features.size()));
+  for (const float p : frame_.static_probability) EXPECT_EQ(p, 1);
+  EXPECT_FALSE(filter.IsHidden({280, 250}));
+}
+
+TEST_F(DynamicFilterTest, HardBoxesTakeAllThatIsInThem) {
+  DynamicFilter filter = Make("boxes");
+  const DynamicKeypoints counts = Run(&filter);
+  EXPECT_EQ(counts.kept, 0);
+  EXPECT_GT(counts.culled, 50);
+  for (size_t i = 0; i < on_person_.size(); ++i) EXPECT_EQ(frame_.static_probability[i], IsInBox(i) ? 0 : 1);
+  EXPECT_TRUE(filter.IsHidden({280, 250}));
+}
+
+TEST_F(DynamicFilterTest, NoneTrustsEverything) {
+  DynamicFilter filter = Make("none");
+  EXPECT_EQ(Run(&filter).InBoxes(), 0);
+  for (const float p : frame_.static_probability) EXPECT_EQ(p, 1);
+}
+
+TEST_F(DynamicFilterTest, PaperKeepsWhatMovesAsItsSurroundings) {
+  DynamicFilter filter = Make("paper");
+  const DynamicKeypoints counts = Run(&filter);
+  EXPECT_NEAR(MeanInBox(false), 1, 0.05);
+  EXPECT_NEAR(MeanInBox(true), 0, 0.05);
+  EXPECT_NEAR(counts.kept, counts.culled, 0.2 * counts.InBoxes());
+}
+
+TEST_F(DynamicFilterTest, MotionTellsThePersonFromTheWallBehind) {
+  DynamicFilter filter = Make("weights");
+  Run(&filter);
+  EXPECT_GT(MeanInBox(false), kMinStaticProbability);
+  EXPECT_LT(MeanInBox(true), 0.1);
+  // Far from the box nothing is doubted much.
+  EXPECT_GT(frame_.static_probability.front(), 0.9);
+}
+
+TEST_F(DynamicFilterTest, WithoutMotionAllInTheBoxIsDoubted) {
+  DynamicOptions options;
+  options.motion = false;
+  DynamicFilter filter(camera_, options, OctaveScales());
+  Run(&filter);
+  EXPECT_LT(MeanInBox(false), kMinStaticProbability);
+  EXPECT_NEAR(MeanInBox(false), MeanInBox(true), 1e-6);
+}
+
+TEST_F(DynamicFilterTest, WhoStandsStillGivesNoEvidence) {
+  // The camera rests too: nothing in the image moves.
+  frame_.features = last_.features;
+  frame_.grid.Build(frame_.features, camera_.IdealBounds());
+  frame_.cam_from_world = last_.cam_from_world;
+  DynamicFilter filter = Make("weights");
+  flow_.Clear(last_);
+  filter.Judge(std::vector{Person(0)}, flow_, frame_, &last_);
+  flow_.Match(last_, filter.Boxes(), {}, frame_);
+  filter.Judge(std::vector{Person(0)}, flow_, last_, &frame_);
+  const std::vector<float> before = frame_.static_probability;
+  filter.Watch(flow_, last_, kDepth, &frame_);
+  EXPECT_EQ(frame_.static_probability, before);
+}
+
+TEST_F(DynamicFilterTest, EvidenceOfALandmarkGrowsWhereItFitsAndFallsWhereItDoesNot) {
+  const DynamicFilter filter = Make("weights");
+  EXPECT_GT(filter.Evidence(0.95f, true), 0);
+  EXPECT_LT(filter.Evidence(0.95f, false), filter.Evidence(0.95f, true));
+  EXPECT_LT(filter.Evidence(0.5f, false), 0);
+  EXPECT_LT(filter.Evidence(0.24f, true), filter.Evidence(0.95f, true));
+  // The odds multiply: of a keypoint that says nothing, the landmark's own.
+  EXPECT_NEAR(TrustInMatch(0.5f, 0.0f), 0.5, 1e-6);
+  EXPECT_NEAR(TrustInMatch(0.5f, 2.0f), 1 / (1 + std::exp(-2.0)), 1e-6);
+  EXPECT_EQ(TrustInMatch(1.0f, -4.0f), 1);
+}
+
+}  // namespace
+}  // namespace dynamic_slam
