@@ -72,7 +72,8 @@ TEST(PoseGraphTest, TheWeakestEdgeGivesWay) {
   for (uint32_t i = 1; i < kNodes; ++i) {
     PoseGraph::Edge& edge = graph.edges[i - 1];
     edge.weight = i == 20 ? 1 : 1000;
-    edge.first_from_second = (i == 20 ? Sim3{1.3, ExpSo3({0, 0.1, 0}), {}} : Sim3()) * TrueEdge(i, i - 1);
+    edge.first_from_second =
+        (i == 20 ? Sim3{1.3, ExpSo3({0, 0.1, 0}), Eigen::Vector3d::Zero()} : Sim3()) * TrueEdge(i, i - 1);
     graph.nodes[i].node_from_world = edge.first_from_second * graph.nodes[i - 1].node_from_world;
   }
   EXPECT_GT(WorstDistance(graph), 0.5);
