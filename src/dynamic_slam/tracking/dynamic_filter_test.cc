@@ -17,11 +17,6 @@ constexpr double kDepth = 3, kShift = 0.06;  // of the scene, and of the camera 
 class DynamicFilterTest : public ::testing::Test {
  protected:
   DynamicFilterTest() {
-    camera_.width = 640;
-    camera_.height = 480;
-    camera_.fx = camera_.fy = 500;
-    camera_.cx = 320;
-    camera_.cy = 240;
     const double wall_px = -camera_.fx * kShift / kDepth;  // 10 px to the left
     for (int row = 0; row < 22; ++row) {
       for (int col = 0; col < 30; ++col) {
@@ -96,7 +91,17 @@ class DynamicFilterTest : public ::testing::Test {
   static constexpr double kPersonPx = 8;
 
   Random random_{7};
-  Camera camera_;
+  static Camera MakeCamera() {
+    Camera camera;
+    camera.width = 640;
+    camera.height = 480;
+    camera.fx = camera.fy = 500;
+    camera.cx = 320;
+    camera.cy = 240;
+    return camera;
+  }
+
+  Camera camera_ = MakeCamera();
   Frame last_, frame_;
   KeypointFlow flow_{camera_, OctaveScales()};
   std::vector<bool> on_person_;
