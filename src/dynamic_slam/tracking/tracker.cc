@@ -14,9 +14,6 @@ constexpr double kWideSearch = 3.0;
 // A pose that comes from descriptors alone is less exact than a prediction.
 constexpr double kRelocalisedSearch = 3.0;
 
-// Until the map is initialised there are more keypoints than usual anyway.
-constexpr double kMaxMoreStarting = 2;
-
 constexpr int kLocalMapPasses = 2;
 
 // A motion is not carried on for longer than so many times the time in which it was seen.
@@ -69,8 +66,7 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   const bool is_starting = state_ == TrackingState::kInitialising || !start_is_certain_;
   double factor = is_starting ? options_.initializer.feature_factor : 1.0;
   if (filter_.options().more_features) {
-    factor *= std::min(1 / (1 - share_in_boxes_),
-                       is_starting ? kMaxMoreStarting : filter_.options().max_feature_factor);
+    factor = std::max(factor, std::min(1 / (1 - share_in_boxes_), filter_.options().max_feature_factor));
   }
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
