@@ -1,0 +1,73 @@
+#include "dynamic_slam/sim/actors.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamic_slam/sim/person.h"
+#include "dynamic_slam/sim/texture.h"
+
+namespace dynamic_slam {
+namespace {
+
+// A person who follows a path at a speed of his own.
+class Walker : public Actor {
+ public:
+  Walker(uint64_t seed, int object, const PlanarPath& path, double start_m, double speed_m_per_s)
+      : person_(seed), object_(object), path_(path), start_m_(start_m), speed_m_per_s_(speed_m_per_s) {
+    // Faster walkers take longer steps; 1.4 m, two steps, at 1.3 m/s.
+    stride_m_ = 0.8 * person_.height_m() * std::sqrt(speed_m_per_s / 1.3);
+  }
+
+  void Place(double time_s, std::vector<MeshInstance>* instances,
+             std::vector<GroundShadow>* shadows) const override {
+    const double walked_m = start_m_ + speed_m_per_s_ * time_s;
+    const PlanarPath::Place place = path_.At(walked_m);
+    const double phase = stride_m_ > 0 ? walked_m / stride_m_ : 0;
+    person_.Place({place.position, place.heading_rad, phase, stride_m_}, object_, instances, shadows);
+  }
+
+ private:
+  Person person_;
+  int object_;
+  PlanarPath path_;
+  double start_m_, speed_m_per_s_, stride_m_;
+};
+
+// Lines across the view, one behind the other, that end where the view does.
+std::vector<PlanarPath> WalksBefore(const World& world, int count) {
+  const Eigen::Vector2d centre = world.camera_centre.head<2>();
+  const Eigen::Vector2d ahead = (world.camera_target - world.camera_centre).head<2>().normalized();
+  const Eigen::Vector2d left(-ahead.y(), ahead.x());
+  std::vector<PlanarPath> walks;
+  for (int i = 0; i < count; ++i) {
+    const double distance = 1.45 + 0.42 * i, reach = 0.42 * distance;
+    walks.push_back(PlanarPath::ToAndFro(centre + distance * ahead - reach * left,
+                                         centre + distance * ahead + reach * left, 0.16));
+  }
+  return walks;
+}
+
+}  // namespace
+
+std::vector<std::unique_ptr<Actor>> MakeActors(const SceneOptions& options, World& world) {
+  std::vector<std::unique_ptr<Actor>> actors;
+  Random random(SubSeed(options.seed, 2));
+  constexpr int kRows = 5;
+  const std::vector<PlanarPath> walks =
+      options.people.near_camera ? WalksBefore(world, std::min(options.people.count, kRows)) : world.walks;
+  for (int i = 0; i < options.people.count && !walks.empty(); ++i) {
+    const PlanarPath& walk = walks[static_cast<size_t>(i) % walks.size()];
+    // Those who share a path keep their distance: they start apart and walk equally fast.
+    Random own(SubSeed(SubSeed(options.seed, 3), static_cast<uint64_t>(i) % walks.size()));
+    const int on_path = i / static_cast<int>(walks.size());
+    const int sharing =
+        (options.people.count - 1 - i % static_cast<int>(walks.size())) / static_cast<int>(walks.size()) + 1;
+    const double start_m = walk.length_m() * (own.Uniform() + static_cast<double>(on_path) / sharing);
+    const double speed = options.people.speed_m_per_s * own.Uniform(0.8, 1.2);
+    actors.push_back(std::make_unique<Walker>(SubSeed(options.seed, 1000 + static_cast<uint64_t>(i)),
+                                              world.AddObject("person", true), walk, start_m, speed));
+  }
+  return actors;
+}
+
+}  // namespace dynamic_slam
