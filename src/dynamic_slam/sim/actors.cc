@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamic_slam/sim/car.h"
 #include "dynamic_slam/sim/person.h"
 #include "dynamic_slam/sim/texture.h"
 
@@ -32,6 +33,49 @@ class Walker : public Actor {
   PlanarPath path_;
   double start_m_, speed_m_per_s_, stride_m_;
 };
+
+// A car that follows a lane.
+class Driver : public Actor {
+ public:
+  Driver(uint64_t seed, int object, const PlanarPath& lane, double start_m, double speed_m_per_s)
+      : car_(seed), object_(object), lane_(lane), start_m_(start_m), speed_m_per_s_(speed_m_per_s) {}
+
+  void Place(double time_s, std::vector<MeshInstance>* instances,
+             std::vector<GroundShadow>* shadows) const override {
+    // The axles are on the lane: the body lies along their chord.
+    const double driven_m = start_m_ + speed_m_per_s_ * time_s, half_m = 0.3 * car_.length_m();
+    const Eigen::Vector2d rear = lane_.At(driven_m - half_m).position,
+                          front = lane_.At(driven_m + half_m).position;
+    const Eigen::Vector2d along = front - rear;
+    car_.Place(0.5 * (front + rear), std::atan2(along.y(), along.x()), driven_m, object_, instances, shadows);
+  }
+
+ private:
+  Car car_;
+  int object_;
+  PlanarPath lane_;
+  double start_m_, speed_m_per_s_;
+};
+
+// Cars on the lanes: a third in the camera's own, as fast as it, the others in the other one.
+void AddDrivers(const SceneOptions& options, World& world, std::vector<std::unique_ptr<Actor>>* actors) {
+  if (world.lanes.empty()) return;
+  Random random(SubSeed(options.seed, 4));
+  const double speed = options.camera.motion == "path" ? options.camera.speed_m_per_s : 8;
+  const double other_speed = random.Uniform(7, 9);
+  const int own = (options.cars.moving + 2) / 3, others = options.cars.moving - own;
+  for (int i = 0; i < options.cars.moving; ++i) {
+    const bool is_own = i < own;
+    const PlanarPath& lane = world.lanes[is_own ? 0 : world.lanes.size() - 1];
+    // The nearest in the own lane stays in view; no two share a place.
+    const double room = lane.length_m() - 2 * world.car_gap_m;
+    const double start_m = is_own ? world.car_gap_m + room * (i + random.Uniform(0, 0.3)) / own
+                                  : lane.length_m() * (i - own + random.Uniform(0, 0.6)) / others;
+    actors->push_back(std::make_unique<Driver>(SubSeed(options.seed, 5000 + static_cast<uint64_t>(i)),
+                                               world.AddObject("car", true), lane, start_m,
+                                               is_own ? speed : other_speed));
+  }
+}
 
 // Lines across the view, one behind the other, that end where the view does.
 std::vector<PlanarPath> WalksBefore(const World& world, int count) {
@@ -67,6 +111,7 @@ std::vector<std::unique_ptr<Actor>> MakeActors(const SceneOptions& options, Worl
     actors.push_back(std::make_unique<Walker>(SubSeed(options.seed, 1000 + static_cast<uint64_t>(i)),
                                               world.AddObject("person", true), walk, start_m, speed));
   }
+  AddDrivers(options, world, &actors);
   return actors;
 }
 

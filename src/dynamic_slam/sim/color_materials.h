@@ -36,7 +36,7 @@ cv::Mat DrawClutter(uint64_t seed, int width, int height);  // the top of a desk
 cv::Mat DrawBooks(uint64_t seed, int width, int height);    // the front of a shelf
 
 // Outdoors.
-cv::Mat DrawFacade(uint64_t seed, int width, int height, double texels_per_m);
+cv::Mat DrawFacade(uint64_t seed, int width, int height, double width_m, double height_m);
 cv::Mat DrawAsphalt(uint64_t seed, int side);
 cv::Mat DrawPaving(uint64_t seed, int side);
 cv::Mat DrawLeaves(uint64_t seed, int side);

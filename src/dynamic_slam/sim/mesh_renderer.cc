@@ -228,10 +228,14 @@ cv::v_float32x4 MeshRenderer::Shade(const Context& context, const Triangle& t, f
               right_v = (t.v[0] - v * t.inverse_depth[0]) * to_x;
   const float down_u = (t.u[1] - u * t.inverse_depth[1]) * to_y,
               down_v = (t.v[1] - v * t.inverse_depth[1]) * to_y;
-  const float right = std::hypot(right_u * width, right_v * height);
-  const float down = std::hypot(down_u * width, down_v * height);
+  const auto length = [](float a, float b) { return std::sqrt(a * a + b * b); };
+  const float right = length(right_u * width, right_v * height);
+  const float down = length(down_u * width, down_v * height);
   const float longer = std::max(right, down), shorter = std::min(right, down);
-  const int samples = std::clamp(static_cast<int>(longer / std::max(shorter, 1e-6f) + 0.4f), 1, 4);
+  // Several along the longer side where the surface is seen at a grazing angle, unless texels are larger than
+  // pixels.
+  const int samples =
+      longer <= 1.5f ? 1 : std::clamp(static_cast<int>(longer / std::max(shorter, 1.0f) + 0.25f), 1, 4);
   const float footprint = std::max(shorter, longer / static_cast<float>(samples));
   const float level = footprint <= 1.0f ? 0.0f : FastLog2(footprint);
   const float major_u = right > down ? right_u : down_u, major_v = right > down ? right_v : down_v;
@@ -245,7 +249,8 @@ cv::v_float32x4 MeshRenderer::Shade(const Context& context, const Triangle& t, f
     const float grain_footprint =
         std::max(right / width, down / height) * repeat * static_cast<float>(grain_.width());
     const float grain_level = grain_footprint <= 1.0f ? 0.0f : FastLog2(grain_footprint);
-    if (grain_level < 6) light *= grain_.Sample(u * repeat, v * repeat, grain_level).get0() / 128.0f;
+    if (grain_level < 5.5f)
+      light *= grain_.SampleFirst(u * repeat, v * repeat, static_cast<int>(grain_level + 0.5f)) / 128.0f;
   }
   if (surface.takes_shadow) {
     const Eigen::Vector3f x = context.centre_in_world +

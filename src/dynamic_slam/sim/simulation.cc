@@ -31,7 +31,11 @@ Camera MakeCamera(const CameraOptions& options) {
   return camera;
 }
 
-World MakeWorld(const SceneOptions& options) { return MakeOffice(options); }
+World MakeWorld(const SceneOptions& options) {
+  if (options.world.kind == "street") return MakeStreet(options);
+  if (options.world.kind == "corridor") return MakeCorridor(options);
+  return MakeOffice(options);
+}
 
 class SimulationSource : public FrameSource {
  public:
@@ -97,7 +101,13 @@ Simulation::Moment Simulation::At(double time_s) const {
 }
 
 RenderedView Simulation::RenderMoment(const Moment& moment, const Rigid3& world_from_cam) const {
-  return renderer_.Render(moment.all, moment.shadows, world_.lighting, world_from_cam);
+  std::vector<GroundShadow> shadows;  // those that can be seen as such
+  constexpr float kFar = 45;          // m
+  const Eigen::Vector2f centre = world_from_cam.translation.head<2>().cast<float>();
+  for (const GroundShadow& shadow : moment.shadows) {
+    if ((shadow.centre - centre).norm() < kFar) shadows.push_back(shadow);
+  }
+  return renderer_.Render(moment.all, shadows, world_.lighting, world_from_cam);
 }
 
 RenderedView Simulation::Render(double time_s, const Rigid3& world_from_cam) const {
