@@ -77,16 +77,17 @@ void AddDrivers(const SceneOptions& options, World& world, std::vector<std::uniq
   }
 }
 
-// Lines across the view, one behind the other, that end where the view does.
+// Ways to and fro across the view, one behind the other, that end where the view does. Whoever comes back has
+// half a metre to those who go.
 std::vector<PlanarPath> WalksBefore(const World& world, int count) {
   const Eigen::Vector2d centre = world.camera_centre.head<2>();
   const Eigen::Vector2d ahead = (world.camera_target - world.camera_centre).head<2>().normalized();
   const Eigen::Vector2d left(-ahead.y(), ahead.x());
   std::vector<PlanarPath> walks;
   for (int i = 0; i < count; ++i) {
-    const double distance = 1.45 + 0.42 * i, reach = 0.42 * distance;
-    walks.push_back(PlanarPath::ToAndFro(centre + distance * ahead - reach * left,
-                                         centre + distance * ahead + reach * left, 0.16));
+    const Eigen::Vector2d middle = centre + (1.6 + 0.95 * i) * ahead;
+    const Eigen::Vector2d reach = 0.42 * (1.6 + 0.95 * i) * left;
+    walks.push_back(PlanarPath::ToAndFro(middle - reach, middle + reach, 0.5));
   }
   return walks;
 }
@@ -96,9 +97,8 @@ std::vector<PlanarPath> WalksBefore(const World& world, int count) {
 std::vector<std::unique_ptr<Actor>> MakeActors(const SceneOptions& options, World& world) {
   std::vector<std::unique_ptr<Actor>> actors;
   Random random(SubSeed(options.seed, 2));
-  constexpr int kRows = 5;
   const std::vector<PlanarPath> walks =
-      options.people.near_camera ? WalksBefore(world, std::min(options.people.count, kRows)) : world.walks;
+      options.people.near_camera ? WalksBefore(world, (options.people.count + 3) / 4) : world.walks;
   for (int i = 0; i < options.people.count && !walks.empty(); ++i) {
     const PlanarPath& walk = walks[static_cast<size_t>(i) % walks.size()];
     // Those who share a path keep their distance: they start apart and walk equally fast.

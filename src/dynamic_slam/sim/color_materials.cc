@@ -28,7 +28,9 @@ void AddOctaves(Random& random, double largest, double smallest, double amplitud
   for (double cell = largest; cell >= smallest; cell /= 2) {
     cv::Mat1f grid(static_cast<int>(image.rows / cell) + 3, static_cast<int>(image.cols / cell) + 3), smooth,
         grey[3];
-    for (float& value : grid) value = static_cast<float>(random.Uniform(-amplitude, amplitude));
+    for (float* value = grid.ptr<float>(); value != grid.ptr<float>() + grid.total(); ++value) {
+      *value = static_cast<float>(random.Uniform(-amplitude, amplitude));
+    }
     cv::resize(grid, smooth, {}, cell, cell, cell > 1.5 ? cv::INTER_CUBIC : cv::INTER_NEAREST);
     cv::Mat1f part = smooth(cv::Rect(0, 0, image.cols, image.rows));
     cv::Mat colored;

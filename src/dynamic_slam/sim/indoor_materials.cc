@@ -184,9 +184,9 @@ cv::Mat DrawCeiling(uint64_t seed, int side, int panels) {
   Random random(seed);
   cv::Mat image(side, side, CV_8UC3, cv::Scalar(215, 220, 220));
   const int step = side / panels;
-  for (int i = 0; i < side * side / 120; ++i) {
+  for (int i = 0; i < side * side / 400; ++i) {
     cv::circle(image, AnyPoint(random, image), static_cast<int>(random.Index(2)),
-               cv::Scalar::all(random.Uniform(110, 200)), cv::FILLED);
+               cv::Scalar::all(random.Uniform(165, 205)), cv::FILLED);
   }
   for (int y = 0; y < panels; ++y) {
     for (int x = 0; x < panels; ++x) {

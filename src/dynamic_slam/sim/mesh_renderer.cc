@@ -235,7 +235,7 @@ cv::v_float32x4 MeshRenderer::Shade(const Context& context, const Triangle& t, f
   // Several along the longer side where the surface is seen at a grazing angle, unless texels are larger than
   // pixels.
   const int samples =
-      longer <= 1.5f ? 1 : std::clamp(static_cast<int>(longer / std::max(shorter, 1.0f) + 0.25f), 1, 4);
+      longer <= 1.5f ? 1 : std::clamp(static_cast<int>(0.6f * longer / std::max(shorter, 1.0f) + 0.6f), 1, 4);
   const float footprint = std::max(shorter, longer / static_cast<float>(samples));
   const float level = footprint <= 1.0f ? 0.0f : FastLog2(footprint);
   const float major_u = right > down ? right_u : down_u, major_v = right > down ? right_v : down_v;

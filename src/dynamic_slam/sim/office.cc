@@ -17,7 +17,7 @@ void AddFloorAndCeiling(World& world, uint64_t seed, double length, double width
   Surface carpet = Painted(DrawCarpet(SubSeed(seed, 1), 1024), 3);
   carpet.takes_shadow = true;
   const int floor = mesh.AddSurface(carpet),
-            ceiling = mesh.AddSurface(Painted(DrawCeiling(SubSeed(seed, 2), 1024, 6), 6));
+            ceiling = mesh.AddSurface(Painted(DrawCeiling(SubSeed(seed, 2), 1024, 6)));
   const double x = length / 2, y = width / 2;
   constexpr double kCarpet = 3.1, kPanels = 3.6;  // m, of one picture
   mesh.AddQuad(floor, {-x, y, 0}, {length, 0, 0}, {0, -width, 0}, {length / kCarpet, width / kCarpet});

@@ -118,11 +118,12 @@ int Simulation::ExposureSamples(int index) const {
   const double exposure_s = 1e-3 * options_.effects.exposure_ms, time_s = truth_[index].timestamp_s;
   if (exposure_s <= 0) return 1;
   const Rigid3 first = motion_.At(time_s - 0.5 * exposure_s), last = motion_.At(time_s + 0.5 * exposure_s);
-  // Things that are near, 2 m away, and people move too.
+  // Of things 2 m away and of people; what lies ahead moves less when the camera moves towards it.
   const double near_m = 2.0, walking_m = 0.5 * exposure_s;
+  const Eigen::Vector3d step = first.rotation.conjugate() * (last.translation - first.translation);
   const double motion_rad = RotationAngle(first.rotation, last.rotation) +
-                            ((last.translation - first.translation).norm() + walking_m) / near_m;
-  constexpr double kStepPx = 2.0;
+                            (step.head<2>().norm() + 0.4 * std::abs(step.z()) + walking_m) / near_m;
+  constexpr double kStepPx = 3.0;  // between two of the pictures that are averaged
   return std::clamp(static_cast<int>(std::lround(motion_rad * camera().fx / kStepPx)), 1, 8);
 }
 
