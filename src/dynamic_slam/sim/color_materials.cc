@@ -70,12 +70,13 @@ cv::Mat DrawGrain() {
   return image;
 }
 
-cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color) {
+cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_front) {
   Random random(seed);
   cv::Mat image(side, side, CV_8UC3, color);
   const cv::Scalar second = AnyColor(random, 0.1, 1.0, 0.9);
   const int step = std::max(side / (6 + static_cast<int>(random.Index(14))), 4);
-  switch (random.Index(7)) {
+  const uint32_t pattern = random.Index(7);
+  switch (!with_front && (pattern == 2 || pattern == 3) ? 6 : pattern) {
     case 0:  // hoops
       for (int y = 0; y < side; y += step)
         cv::rectangle(image, {0, y}, {side, y + step / 2 - 1}, second, cv::FILLED);

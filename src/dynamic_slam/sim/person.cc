@@ -15,7 +15,7 @@ namespace {
 constexpr double kDrawnHeight =
     1.75;  // m; proportions of limbs after Winter, "Biomechanics" (2009), table 4.1
 constexpr double kThighLength = 0.43, kShinLength = 0.42, kAnkleHeight = 0.075, kUpperArmLength = 0.30;
-constexpr double kHipHalf = 0.095, kShoulderHalf = 0.205, kShoulderUp = 0.455;
+constexpr double kHipHalf = 0.095, kShoulderHalf = 0.200, kShoulderUp = 0.432;
 const Eigen::Vector3d kX(1, 0, 0), kY(0, 1, 0), kZ(0, 0, 1);
 
 using Ring = Mesh::Ring;
@@ -65,7 +65,7 @@ Person::Person(uint64_t seed) {
   const bool short_sleeves = random.Index(2) == 0, skirt = woman && random.Index(3) == 0;
   const bool long_hair = woman && random.Index(3) != 0, backpack = random.Index(4) == 0;
   const Surface shirt_cloth = Covered(DrawCloth(SubSeed(seed, 1), 512, shirt));
-  const Surface sleeve_cloth = Covered(DrawCloth(SubSeed(seed, 1), 256, shirt), 2);
+  const Surface sleeve_cloth = Covered(DrawCloth(SubSeed(seed, 1), 256, shirt, false), 2);
   const Surface leg_cloth = Covered(DrawPlain(SubSeed(seed, 2), 256, trousers, 9), 2);
   const Surface bare = Covered(DrawPlain(SubSeed(seed, 3), 64, skin, 3), 1);
   const Surface hair_fibre = Covered(DrawPlain(SubSeed(seed, 4), 64, hair, 9), 1);
@@ -82,8 +82,8 @@ Person::Person(uint64_t seed) {
                                      {{0, 0, -0.02}, 0.12 * b, 0.17 * b},
                                      {{0, 0, -0.25}, 0.17 * b, 0.21 * b},
                                      {{0, 0, -0.46}, 0.20 * b, 0.23 * b}};
-    pelvis.AddLoft(pelvis.AddSurface(Covered(DrawCloth(SubSeed(seed, 7), 256, trousers), 3)), rings, kX, kY,
-                   14);
+    pelvis.AddLoft(pelvis.AddSurface(Covered(DrawCloth(SubSeed(seed, 7), 256, trousers, false), 3)), rings,
+                   kX, kY, 14);
   } else {
     const std::vector<Ring> rings = {{{0, 0, 0.10}, 0.09 * b, 0.12 * b},
                                      {{0, 0, 0.0}, 0.115 * b, 0.165 * b},
@@ -107,7 +107,7 @@ Person::Person(uint64_t seed) {
   const std::vector<Ring> neck = {{{0.005, 0, 0.64}, 0.05, 0.052}, {{-0.005, 0, 0.52}, 0.058, 0.062}};
   torso.AddLoft(torso.AddSurface(bare), neck, kX, kY, 10);
   if (backpack) {
-    const Surface pack = Covered(DrawCloth(SubSeed(seed, 8), 256, AnyColor(random, 0.1, 0.9, 0.9)), 2);
+    const Surface pack = Covered(DrawCloth(SubSeed(seed, 8), 256, AnyColor(random, 0.1, 0.9, 0.9), false), 2);
     torso.AddEllipsoid(torso.AddSurface(pack), {-0.17 * b, 0, 0.28}, {0.10, 0.15, 0.22}, 12, 9);
   }
 
@@ -126,9 +126,9 @@ Person::Person(uint64_t seed) {
   Mesh& upper_arm = *parts[kUpperArm];
   AddLimb(upper_arm, upper_arm.AddSurface(sleeve_cloth),
           {{-0.055, 0.02},
-           {-0.045, 0.042},
-           {-0.01, 0.058 * b},
-           {0.08, 0.056 * b},
+           {-0.040, 0.036},
+           {-0.01, 0.052 * b},
+           {0.08, 0.054 * b},
            {0.2, 0.048 * b},
            {0.29, 0.044},
            {0.33, 0.03}});

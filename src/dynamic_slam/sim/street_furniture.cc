@@ -153,7 +153,8 @@ void AddSign(World& world, uint64_t seed, const Eigen::Vector2d& position, doubl
 void AddBin(World& world, uint64_t seed, const Eigen::Vector2d& position, double yaw_rad) {
   Random random(seed);
   Mesh mesh;
-  const int plastic = mesh.AddSurface(Painted(DrawCloth(seed, 128, AnyColor(random, 0.15, 0.7, 0.8)), 2));
+  const int plastic =
+      mesh.AddSurface(Painted(DrawCloth(seed, 128, AnyColor(random, 0.15, 0.7, 0.8), false), 2));
   const double side = random.Uniform(0.5, 0.8), height = random.Uniform(0.7, 1.3);
   mesh.AddBox(plastic, {0, 0, height / 2 + 0.05}, {side, side * random.Uniform(0.9, 1.5), height});
   world.Add(std::move(mesh), Standing(position, yaw_rad), kNoObject, 80.0f);
