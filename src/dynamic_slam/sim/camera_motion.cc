@@ -79,7 +79,7 @@ Rigid3 CameraMotion::At(double time_s) const {
                    tremor.z());
   }
   if (options_.motion == "rpy") {
-    const Eigen::Vector3d offset = 0.06 * (Wave(t, 4.3) * left + Wave(t, 6.9) * ahead + Wave(t, 5.1) * up);
+    const Eigen::Vector3d offset = 0.10 * (Wave(t, 4.3) * left + Wave(t, 6.9) * ahead + Wave(t, 5.1) * up);
     return Looking(centre_ + a * offset + tremor, heading_rad_ + a * 0.35 * Wave(t, 7.3),
                    pitch + a * 0.18 * Wave(t, 5.9), a * 0.22 * Wave(t, 4.7));
   }

@@ -33,8 +33,7 @@ struct MeshRenderer::Context {
 
 namespace {
 
-constexpr float kNear = 0.06f;  // m; nothing nearer is drawn
-constexpr int kBandRows = 16;   // at a time, so that the samples stay in the cache
+constexpr int kBandRows = 16;  // at a time, so that the samples stay in the cache
 constexpr int kSamples = 4;
 // Where in a pixel the samples are: a rotated square, no two in one row or column.
 constexpr float kSampleX[kSamples] = {-0.125f, 0.375f, 0.125f, -0.375f};
@@ -56,7 +55,7 @@ DS_DISPATCH_AVX2 void CoverRow(const float* __restrict m, const float* __restric
     const float b = m3 * x[i] + m4 * y[i] + m5 + o1;
     const float c = m6 * x[i] + m7 * y[i] + m8 + o2;
     const float z = a + b + c;
-    const float inside = std::min(std::min(a, b), std::min(c, 1.0f / kNear - z));
+    const float inside = std::min(std::min(a, b), std::min(c, 1.0f / kNearestDrawn - z));
     const bool wins = (inside >= kSlack * z) & (z > best[i]);
     best[i] = wins ? z : best[i];
     best_id[i] = wins ? id : best_id[i];
@@ -75,7 +74,7 @@ float Dot(const Eigen::RowVector3f& row, float x, float y) { return row[0] * x +
 
 // Bits for the planes that a point is outside of.
 int OutCode(const Eigen::Vector3f& x, float low_x, float low_y, float high_x, float high_y) {
-  return (x.z() < kNear) | (x.x() < low_x * x.z()) << 1 | (x.x() > high_x * x.z()) << 2 |
+  return (x.z() < kNearestDrawn) | (x.x() < low_x * x.z()) << 1 | (x.x() > high_x * x.z()) << 2 |
          (x.y() < low_y * x.z()) << 3 | (x.y() > high_y * x.z()) << 4;
 }
 
@@ -121,7 +120,7 @@ cv::Rect MeshRenderer::PixelBox(const Eigen::Vector3f* corners) const {
   };
   int codes = 0;
   for (int i = 0; i < 3; ++i) codes |= OutCode(corners[i], low_x_, low_y_, high_x_, high_y_);
-  if (codes & 1) cut([](const Eigen::Vector3f& x) { return x.z() - kNear; });
+  if (codes & 1) cut([](const Eigen::Vector3f& x) { return x.z() - kNearestDrawn; });
   if (codes & 2) cut([this](const Eigen::Vector3f& x) { return x.x() - low_x_ * x.z(); });
   if (codes & 4) cut([this](const Eigen::Vector3f& x) { return high_x_ * x.z() - x.x(); });
   if (codes & 8) cut([this](const Eigen::Vector3f& x) { return x.y() - low_y_ * x.z(); });
@@ -157,7 +156,7 @@ void MeshRenderer::Project(const MeshInstance& instance, const Lighting& lightin
   const Rigid3 cam_from_mesh = cam_from_world * instance.world_from_mesh;
   const Eigen::Vector3d& centre = cam_from_mesh.translation;
   const double radius = instance.radius_m;
-  if (centre.z() + radius < kNear || centre.norm() - radius > instance.max_distance_m) return;
+  if (centre.z() + radius < kNearestDrawn || centre.norm() - radius > instance.max_distance_m) return;
   // Outside one of the four planes through the optical centre.
   const auto outside = [&](double a, double b, double slope) {  // a < slope * b
     return (a - slope * b) / std::sqrt(1 + slope * slope) > radius;
@@ -275,6 +274,41 @@ cv::v_float32x4 MeshRenderer::ShadeBackdrop(const Context& context, float ray_x,
   return context.lighting.backdrop->Sample(u, v, 0);
 }
 
+// A pixel that sees more than one triangle. `main_id`: of the triangles, the one with most samples.
+cv::v_float32x4 MeshRenderer::ShadeOutline(const Context& context, const std::vector<Triangle>& triangles,
+                                           const int* ids, float x, float y, int* main_id) const {
+  cv::v_float32x4 color = cv::v_setzero_f32();
+  int most = 0;
+  unsigned done = 0;
+  for (int s = 0; s < kSamples; ++s) {
+    if (done >> s & 1) continue;
+    // The samples that see the same surface of the same object are shaded once, at their mean place.
+    int count = 0;
+    float dx = 0, dy = 0;
+    for (int k = s; k < kSamples; ++k) {
+      const bool same = ids[k] == ids[s] || (ids[k] >= 0 && ids[s] >= 0 &&
+                                             triangles[ids[k]].surface == triangles[ids[s]].surface &&
+                                             triangles[ids[k]].object == triangles[ids[s]].object);
+      if (!same) continue;
+      done |= 1u << k;
+      dx += kSampleX[k];
+      dy += kSampleY[k];
+      ++count;
+    }
+    const float share = 1.0f / static_cast<float>(count);
+    const float at_x = x + dx * share / static_cast<float>(camera_.fx);
+    const float at_y = y + dy * share / static_cast<float>(camera_.fy);
+    const cv::v_float32x4 shade =
+        ids[s] < 0 ? ShadeBackdrop(context, at_x, at_y) : Shade(context, triangles[ids[s]], at_x, at_y);
+    color += shade * cv::v_setall_f32(static_cast<float>(count) / kSamples);
+    if (count > most) {
+      most = count;
+      *main_id = ids[s];
+    }
+  }
+  return color;
+}
+
 RenderedView MeshRenderer::Render(const std::vector<const MeshInstance*>& instances,
                                   const std::vector<GroundShadow>& shadows, const Lighting& lighting,
                                   const Rigid3& world_from_cam) const {
@@ -327,35 +361,11 @@ RenderedView MeshRenderer::Render(const std::vector<const MeshInstance*>& instan
         const int ids[kSamples] = {nearest(line, column), nearest(line + 1, column),
                                    nearest(line + 2, column), nearest(line + 3, column)};
         const float x = ray_x_(row, column), y = ray_y_(row, column);
-        cv::v_float32x4 color = cv::v_setzero_f32();
-        int most = 0, main_id = -1;  // of the triangles, the one with most samples
-        unsigned done = 0;
-        for (int s = 0; s < kSamples; ++s) {
-          if (done >> s & 1) continue;
-          // The samples that see the same surface of the same object, and their mean place.
-          int count = 0;
-          float dx = 0, dy = 0;
-          for (int k = s; k < kSamples; ++k) {
-            const bool same = ids[k] == ids[s] || (ids[k] >= 0 && ids[s] >= 0 &&
-                                                   triangles[ids[k]].surface == triangles[ids[s]].surface &&
-                                                   triangles[ids[k]].object == triangles[ids[s]].object);
-            if (!same) continue;
-            done |= 1u << k;
-            dx += kSampleX[k];
-            dy += kSampleY[k];
-            ++count;
-          }
-          const float share = 1.0f / static_cast<float>(count);
-          const float at_x = x + dx * share / static_cast<float>(camera_.fx);
-          const float at_y = y + dy * share / static_cast<float>(camera_.fy);
-          const cv::v_float32x4 shade =
-              ids[s] < 0 ? ShadeBackdrop(context, at_x, at_y) : Shade(context, triangles[ids[s]], at_x, at_y);
-          color += shade * cv::v_setall_f32(static_cast<float>(count) / kSamples);
-          if (count > most) {
-            most = count;
-            main_id = ids[s];
-          }
-        }
+        int main_id = ids[0];
+        const cv::v_float32x4 color =
+            ids[0] == ids[1] && ids[1] == ids[2] && ids[2] == ids[3]
+                ? (main_id < 0 ? ShadeBackdrop(context, x, y) : Shade(context, triangles[main_id], x, y))
+                : ShadeOutline(context, triangles, ids, x, y, &main_id);
         float values[4];
         cv::v_store(values, color);
         view.image(row, column) = {values[0], values[1], values[2]};
@@ -366,74 +376,6 @@ RenderedView MeshRenderer::Render(const std::vector<const MeshInstance*>& instan
     }
   }
   return view;
-}
-
-double MeshRenderer::VisibleShare(const std::vector<const MeshInstance*>& instances, int object,
-                                  const RenderedView& view, const Rigid3& world_from_cam) const {
-  // The silhouette on a coarse grid in the ideal image, which ends two images away.
-  const Rigid3 cam_from_world = world_from_cam.Inverse();
-  std::vector<Eigen::Vector2d> corners;  // three for each triangle
-  Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
-  const Eigen::Vector2d size(camera_.width, camera_.height);
-  for (const MeshInstance* instance : instances) {
-    if (instance->object != object) continue;
-    const Rigid3 cam_from_mesh = cam_from_world * instance->world_from_mesh;
-    for (const Mesh::Corners& triangle : instance->mesh->triangles) {
-      Eigen::Vector2d px[3];
-      bool ahead = true;
-      for (int k = 0; k < 3; ++k) {
-        const Eigen::Vector3d x =
-            cam_from_mesh * instance->mesh->points[triangle.point[k]].cast<double>().eval();
-        ahead = ahead && x.z() > kNear;
-        if (ahead) px[k] = camera_.Project(x).cwiseMax(-2 * size).cwiseMin(3 * size);
-      }
-      if (!ahead) continue;
-      for (const Eigen::Vector2d& p : px) {
-        low = low.cwiseMin(p);
-        high = high.cwiseMax(p);
-        corners.push_back(p);
-      }
-    }
-  }
-  if (corners.empty()) return 0;
-  constexpr int kCells = 64;
-  const double cell = std::max((high - low).maxCoeff() / kCells, 0.5);
-  const int columns = static_cast<int>((high.x() - low.x()) / cell) + 1;
-  const int rows = static_cast<int>((high.y() - low.y()) / cell) + 1;
-  cv::Mat1b grid(rows, columns, uint8_t{0});
-  for (size_t i = 0; i < corners.size(); i += 3) {
-    const Eigen::Vector2d a = (corners[i] - low) / cell, b = (corners[i + 1] - low) / cell,
-                          c = (corners[i + 2] - low) / cell;
-    const auto edge = [](const Eigen::Vector2d& from, const Eigen::Vector2d& to, double x, double y) {
-      return (to.x() - from.x()) * (y - from.y()) - (to.y() - from.y()) * (x - from.x());
-    };
-    const double sign = edge(a, b, c.x(), c.y()) >= 0 ? 1 : -1;
-    const Eigen::Vector2d least = a.cwiseMin(b).cwiseMin(c), most = a.cwiseMax(b).cwiseMax(c);
-    for (int y = static_cast<int>(least.y()); y <= std::min(static_cast<int>(most.y()), rows - 1); ++y) {
-      for (int x = static_cast<int>(least.x()); x <= std::min(static_cast<int>(most.x()), columns - 1); ++x) {
-        const double px = x + 0.5, py = y + 0.5;
-        if (sign * edge(a, b, px, py) >= 0 && sign * edge(b, c, px, py) >= 0 &&
-            sign * edge(c, a, px, py) >= 0) {
-          grid(y, x) = 1;
-        }
-      }
-    }
-  }
-  int whole = 0, shown = 0;
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      if (grid(y, x) == 0) continue;
-      ++whole;
-      const Eigen::Vector2d ideal = low + Eigen::Vector2d(x + 0.5, y + 0.5) * cell;
-      const Eigen::Vector3d ray = camera_.Unproject(ideal);
-      if (ray.x() < low_x_ || ray.x() > high_x_ || ray.y() < low_y_ || ray.y() > high_y_) continue;
-      const Eigen::Vector2d raw = camera_.Distort(ideal);
-      const int column = static_cast<int>(std::lround(raw.x())), row = static_cast<int>(std::lround(raw.y()));
-      if (column < 0 || row < 0 || column >= camera_.width || row >= camera_.height) continue;
-      if (view.objects(row, column) == object) ++shown;
-    }
-  }
-  return whole == 0 ? 1.0 : static_cast<double>(shown) / whole;
 }
 
 }  // namespace dynamic_slam

@@ -11,6 +11,7 @@
 namespace dynamic_slam {
 
 constexpr int kNoObject = -1;
+constexpr float kNearestDrawn = 0.06f;  // m; nothing nearer is seen
 
 // A mesh at a place.
 struct MeshInstance {
@@ -76,6 +77,8 @@ class MeshRenderer {
                std::vector<Triangle>* triangles) const;
   cv::Rect PixelBox(const Eigen::Vector3f* corners) const;
   cv::v_float32x4 Shade(const Context& context, const Triangle& triangle, float ray_x, float ray_y) const;
+  cv::v_float32x4 ShadeOutline(const Context& context, const std::vector<Triangle>& triangles, const int* ids,
+                               float x, float y, int* main_id) const;
   cv::v_float32x4 ShadeBackdrop(const Context& context, float ray_x, float ray_y) const;
 
   Camera camera_;
