@@ -49,6 +49,20 @@ class CliSimulateTest(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stdout, r"rmse +0\.000000")
 
+    def test_a_scene_brings_the_truth_of_its_objects(self):
+        result = self.simulate("office", "--frames", "3", "--out", "a", "--set", "people.count=1", "--depth")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(sorted(os.listdir(os.path.join(self.folder, "a"))),
+                         ["boxes.csv", "camera.yaml", "depth", "depth.txt", "groundtruth.txt", "masks", "rgb", "rgb.txt",
+                          "scene.yaml"])
+        boxes = read(self.folder, "a", "boxes.csv").decode().splitlines()
+        self.assertEqual(boxes[0], "timestamp,actor,class,x,y,w,h,visible,moving")
+        self.assertIn("chair", {line.split(",")[2] for line in boxes[1:]})
+        # The scene beside the images gives them again.
+        self.assertEqual(self.simulate("a/scene.yaml", "--out", "b").returncode, 0)
+        for name in os.listdir(os.path.join(self.folder, "a", "rgb")):
+            self.assertEqual(read(self.folder, "a", "rgb", name), read(self.folder, "b", "rgb", name))
+
     def test_does_not_replace_a_sequence_unasked(self):
         self.assertEqual(self.simulate("room", "--frames", "1", "--out", "a").returncode, 0)
         self.assert_fails("room --frames 1 --out a", "holds a sequence already", "--force")
@@ -58,7 +72,10 @@ class CliSimulateTest(unittest.TestCase):
         self.assert_fails("room --out a --frames 0", "--frames")
         self.assert_fails("room --out a --noise -1", "--noise")
         self.assert_fails("room", "--out is required")
-        self.assert_fails("moon --out a", "WORLD")
+        self.assert_fails("moon --out a", "scene 'moon'", "room", "office")
+        self.assert_fails("office --out a --set people.cuont=1", "people.count")
+        self.assert_fails("office --out a --set camera.motion=path", "camera.motion", "xyz")
+        self.assert_fails("room --out a --set people.count=1", "no --set")
         self.assert_fails("room --out a --camera no_such_camera", "no_such_camera", "tum_fr1")
         self.assert_fails("room --out /dev/null/a --frames 1", "/dev/null/a")
         self.assertEqual(os.listdir(self.folder), [])
