@@ -34,7 +34,7 @@ class FaultyExecutor : public Executor {
       if (fault == Fault::kThrow) throw std::runtime_error("disk full");
       while (fault == Fault::kWaitForStop && !token.stop_requested()) std::this_thread::sleep_for(1ms);
       task(token);
-      ++done;
+      done += lane == Lane::kMapping;
     });
   }
   int Waiting(Lane lane) const override { return executor_->Waiting(lane); }
@@ -43,7 +43,7 @@ class FaultyExecutor : public Executor {
   void ThrowIfFailed() const override { executor_->ThrowIfFailed(); }
 
   Fault fault = Fault::kNone;  // of the tasks posted from now on
-  std::atomic<int> done = 0;
+  std::atomic<int> done = 0;  // in the lane of mapping
 
  private:
   std::unique_ptr<Executor> executor_;
