@@ -73,15 +73,15 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::filesystem::path out = OutputFolder(arguments);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
   system.SetDetector(detector);
+  if (!arguments.masks.empty() && !std::filesystem::is_directory(arguments.masks)) {
+    throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
+  }
   PrepareOutputFolder(out);
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   RunConsole console(arguments.quiet);
   RunControl control = console.Control();
   std::optional<MaskFolder> masks;
   if (!arguments.masks.empty()) {
-    if (!std::filesystem::is_directory(arguments.masks)) {
-      throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
-    }
     control.mask = [folder =
                         MaskFolder(arguments.masks, cv::Size(system.camera().width, system.camera().height))](
                        const SourceImage& image) { return folder.Read(image); };

@@ -272,6 +272,59 @@ class CliRunTest(unittest.TestCase):
             self.assertNotIn("frame", result.stderr)
             self.assertEqual(result.stdout, "")
 
+    def boxes_file(self, folder, frames, detected):
+        """Boxes of a person who stands in the right half of each image."""
+        rows = ["timestamp,class,score,x,y,w,h"]
+        for line in data_lines(folder, "rgb.txt")[:frames]:
+            if detected:
+                rows.append(f"{line.split()[0]},person,0.9,320,0,320,480")
+        return self.write("boxes.csv", "\n".join(rows) + "\n")
+
+    def test_a_dynamic_box_is_masked_counted_and_not_trusted(self):
+        out, masks = os.path.join(self.folder, "out"), os.path.join(self.folder, "masks")
+        boxes = self.boxes_file(self.room, 40, True)
+        result = run_program("run", self.room, "--max-frames", "40", "--detector", "boxes:" + boxes, "--out", out,
+                             "--export-masks", masks, "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        rows = [line.split(",") for line in read(out, "frames.csv").splitlines()]
+        columns = {name: rows[0].index(name) for name in ["static", "dynamic", "culled", "kept", "keypoints"]}
+        for row in rows[1:]:
+            count = {name: int(row[column]) for name, column in columns.items()}
+            self.assertEqual(count["static"] + count["dynamic"], count["keypoints"])
+            self.assertEqual(count["culled"] + count["kept"], count["dynamic"])
+            self.assertGreater(count["dynamic"], 100)
+        ratio = json.loads(read(out, "summary.json"))["dynamic_keypoints"]["mean_ratio"]
+        self.assertTrue(0.2 < ratio < 0.8, ratio)
+        self.assertEqual(len(os.listdir(masks)), 40)
+
+        # With these masks no keypoint is left there at all.
+        masked = os.path.join(self.folder, "masked")
+        result = run_program("run", self.room, "--max-frames", "40", "--masks", masks, "--detector", "boxes:" + boxes,
+                             "--out", masked, "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        left = [line.split(",")[columns["dynamic"]] for line in read(masked, "frames.csv").splitlines()[1:]]
+        before = [row[columns["dynamic"]] for row in rows[1:]]
+        # Only in the margin around the box.
+        self.assertLess(sum(map(int, left)), 0.2 * sum(map(int, before)))
+
+    def test_masks_that_do_not_fit_are_input_errors(self):
+        self.assert_input_error([self.room, "--masks", os.path.join(self.folder, "nowhere")], "nowhere", "no folder")
+
+    def test_ablation_compares_over_common_frames(self):
+        out = os.path.join(self.folder, "ablation")
+        boxes = self.boxes_file(self.room, 30, True)
+        result = run_program("bench", "ablation", self.room, "--max-frames", "30", "--detector", "boxes:" + boxes,
+                             "--out", out, "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        rows = json.loads(read(out, "ablation.json"))
+        self.assertEqual([row["variant"] for row in rows][:4], ["none", "hard boxes", "paper", "default"])
+        none = rows[0]
+        self.assertGreater(none["coverage"], 0.7)
+        self.assertFalse(none["failed"])
+        for row in rows:
+            self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.05 * row["path_m"])
+            self.assertEqual(row["common_ape_m"] is None, row["failed"])
+
     def test_demo(self):
         out = os.path.join(self.folder, "a")
         arguments = ["demo", "--frames", "40", "--seed", "2", "--out", out]

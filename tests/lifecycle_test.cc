@@ -30,7 +30,7 @@ class FaultyExecutor : public Executor {
       : executor_(mode == RunMode::kOffline ? MakeInlineExecutor() : MakeThreadedExecutor()) {}
 
   void Post(Lane lane, Task task) override {
-    executor_->Post(lane, [fault = fault, task = std::move(task), this](const std::stop_token& token) {
+    executor_->Post(lane, [lane, fault = fault, task = std::move(task), this](const std::stop_token& token) {
       if (fault == Fault::kThrow) throw std::runtime_error("disk full");
       while (fault == Fault::kWaitForStop && !token.stop_requested()) std::this_thread::sleep_for(1ms);
       task(token);
