@@ -69,8 +69,8 @@ struct TrackerOptions {
   double motion_radius_px = 15;
   double local_map_radius_px = 4;
   int min_motion_inliers = 15;
-  int min_inliers = 30;
-  int min_relocalisation_inliers = 30;
+  int min_inliers = 40;
+  int min_relocalisation_inliers = 50;
   int local_keyframes = 60;
   int relocalisation_keyframes = 20;
   int reset_keyframes = 5;
