@@ -21,9 +21,6 @@ constexpr double kCornerRadius = 3;
 // Nothing at rest is expected nearer than this part of the median depth.
 constexpr double kNearestDepthRatio = 0.3;
 
-// How far beyond its box, over its mean side, an object is watched: an arm's length.
-constexpr double kReach = 0.25;
-
 // By so many sigmas an object must move differently from what is at rest for a motion to tell them apart.
 constexpr double kApart = 3;
 
@@ -32,7 +29,7 @@ constexpr double kLimbs = 0.4;
 
 // Density of wrong matches, which lie anywhere in the window of the search, over their share of a tenth;
 // 1/px^2.
-constexpr double kMismatch = 0.1 / (std::numbers::pi * 20 * 20);
+constexpr double kMismatch = 0.1 / (std::numbers::pi * KeypointFlow::kRadiusPx * KeypointFlow::kRadiusPx);
 
 // What one frame can tell at most, as errors of matches have longer tails than any model.
 constexpr double kMostEvidence = 2;
@@ -44,11 +41,6 @@ double DistanceToSegment(const Eigen::Vector2d& p, const Eigen::Vector2d& a, con
   const double squared = along.squaredNorm();
   const double t = squared > 0 ? std::clamp((p - a).dot(along) / squared, 0.0, 1.0) : 0.0;
   return (p - a - t * along).norm();
-}
-
-bool Contains(const Box& box, double x, double y, double margin_px) {
-  return x >= box.x - margin_px && y >= box.y - margin_px && x < box.x + box.width + margin_px &&
-         y < box.y + box.height + margin_px;
 }
 
 }  // namespace
@@ -74,6 +66,11 @@ bool DynamicFilter::IsHidden(const Eigen::Vector2d& ideal_px) const {
   const Eigen::Vector2d px = camera_.Distort(ideal_px);
   return std::any_of(boxes_.begin(), boxes_.end(),
                      [&](const DynamicBox& box) { return box.box.Contains(px.x(), px.y()); });
+}
+
+void DynamicFilter::Reset() {
+  boxes_.clear();
+  last_boxes_.clear();
 }
 
 std::vector<Box> DynamicFilter::Boxes() const {
@@ -114,7 +111,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     for (const DynamicBox& box : boxes_) {
       const Box& b = box.box;
       const double margin_px = weights ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
-      if (!Contains(b, keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
+      if (!b.Contains(keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
       in_box[i] = 1;
       at_rest *= 1 - box.probability * options_.object_share;
     }
@@ -205,8 +202,8 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
                             std::log1p(length_px / (std::sqrt(2 * std::numbers::pi) * sigma_px));
     double evidence = 0;
     for (const Mover& mover : movers) {
-      const double ring_px = kReach * std::sqrt(mover.to.Area());
-      if (!Contains(mover.to, now.raw_x, now.raw_y, ring_px)) continue;
+      const double ring_px = KeypointFlow::kReach * std::sqrt(mover.to.Area());
+      if (!mover.to.Contains(now.raw_x, now.raw_y, ring_px)) continue;
       const Eigen::Vector2d center(mover.from.CenterX(), mover.from.CenterY());
       const Eigen::Vector2d raw_before(before.raw_x, before.raw_y);
       const Eigen::Vector2d moved_px =

@@ -44,6 +44,11 @@ class DynamicFilter {
   // not.
   float Evidence(float static_probability, bool fits) const;
 
+  // Forgets the boxes of earlier frames.
+  void Reset();
+
+  bool HasBoxes() const { return !boxes_.empty(); }
+
   const DynamicOptions& options() const { return options_; }
 
  private:

@@ -127,6 +127,15 @@ TEST_F(DynamicFilterTest, HardBoxesTakeAllThatIsInThem) {
   EXPECT_TRUE(filter.IsHidden({280, 250}));
 }
 
+TEST_F(DynamicFilterTest, ResetForgetsTheBoxes) {
+  DynamicFilter filter = Make("boxes");
+  Run(&filter);
+  EXPECT_TRUE(filter.HasBoxes());
+  filter.Reset();
+  EXPECT_FALSE(filter.HasBoxes());
+  EXPECT_FALSE(filter.IsHidden({280, 250}));
+}
+
 TEST_F(DynamicFilterTest, NoneTrustsEverything) {
   DynamicFilter filter = Make("none");
   EXPECT_EQ(Run(&filter).InBoxes(), 0);

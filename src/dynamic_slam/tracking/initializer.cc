@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "dynamic_slam/tracking/dynamic_filter.h"
+#include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
 namespace {

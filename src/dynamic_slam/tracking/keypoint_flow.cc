@@ -8,15 +8,8 @@
 namespace dynamic_slam {
 namespace {
 
-// What an object or the camera's translation adds to the rotation from one frame to the next; a person who
-// walks past at 2 m, at 30 frames a second, moves by less.
-constexpr float kRadiusPx = 20;
-
 // Nearest over second nearest distance.
 constexpr double kRatio = 0.8;
-
-// Around a box as much as selective tracking looks at (SelectiveOptions::ring_ratio).
-constexpr double kRing = 0.25;
 
 }  // namespace
 
@@ -35,9 +28,7 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
   for (uint32_t i = 0; i < last.features.size(); ++i) {
     const Keypoint& from = last.features.keypoints[i];
     const bool is_near = std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
-      const double ring_px = kRing * std::sqrt(box.Area());
-      return Box{box.x - ring_px, box.y - ring_px, box.width + 2 * ring_px, box.height + 2 * ring_px}
-          .Contains(from.raw_x, from.raw_y);
+      return box.Contains(from.raw_x, from.raw_y, kReach * std::sqrt(box.Area()));
     });
     if (!is_near) continue;
     const Eigen::Vector3d ray = rotation * camera_.Unproject({from.x, from.y});

@@ -19,6 +19,14 @@ class KeypointFlow {
  public:
   static constexpr uint32_t kNone = 0xffffffffu;
 
+  // How far around a box, over its mean side: an arm's length, and as much as selective tracking looks at
+  // (SelectiveOptions::ring_ratio).
+  static constexpr double kReach = 0.25;
+
+  // What an object or the camera's translation adds to the rotation from one frame to the next; a person who
+  // walks past at 2 m, at 30 frames a second, moves by less.
+  static constexpr float kRadiusPx = 20;
+
   KeypointFlow(const Camera& camera, std::vector<float> octave_scales)
       : camera_(camera), octave_scales_(std::move(octave_scales)) {}
 

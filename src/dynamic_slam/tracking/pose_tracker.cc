@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "dynamic_slam/tracking/dynamic_filter.h"
+#include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
 namespace {

@@ -107,8 +107,8 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
       if (last_has_pose_) {
         velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
         velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
+        if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
       }
-      if (last_has_pose_) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
       if (!start_is_certain_) ReviewStart(&result);
       if (state_ == TrackingState::kTracking && !result.map_was_reset) {
         InsertKeyframeIfDue(keyframes_waiting, &result);
@@ -194,6 +194,8 @@ void Tracker::Reset() {
   TrackingResult ignored;
   EmptyMap(&ignored);
   initializer_.Reset();
+  filter_.Reset();
+  share_in_boxes_ = 0;
   random_ = Random(seed_);
 }
 
@@ -325,11 +327,11 @@ double Tracker::MedianDepthOfFrame() const {
 }
 
 void Tracker::CountVisibility() {
+  const bool shield = filter_.options().shield_hidden && filter_.HasBoxes();
   for (size_t i = 0; i < view_.size(); ++i) {
     if (in_view_[i] == 0) continue;
     // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
-    if (filter_.options().shield_hidden &&
-        filter_.IsHidden(camera_.Project(frame_.cam_from_world * view_.positions[i]))) {
+    if (shield && filter_.IsHidden(camera_.Project(frame_.cam_from_world * view_.positions[i]))) {
       continue;
     }
     visibility_.visible.push_back(view_.ids[i]);
