@@ -20,9 +20,9 @@ struct RunProgress {
 
 // What a run asks and tells while it goes on; each may be empty.
 struct RunControl {
-  std::function<void(const RunProgress&)> on_frame;  // after each image
-  std::function<bool()> should_stop;                 // asked often: true ends the run early
-  std::function<cv::Mat(const SourceImage&)> mask;   // of Process, for each image
+  std::function<void(const RunProgress&)> on_frame = {};  // after each image
+  std::function<bool()> should_stop = {};                 // asked often: true ends the run early
+  std::function<cv::Mat(const SourceImage&)> mask = {};   // of Process, for each image
 };
 
 // Runs every image of the source through the system, then Finish(); in realtime mode at the pace of the time

@@ -34,6 +34,24 @@ constexpr double kMismatch = 0.1 / (std::numbers::pi * KeypointFlow::kRadiusPx *
 // What one frame can tell at most, as errors of matches have longer tails than any model.
 constexpr double kMostEvidence = 2;
 
+// Of what is at rest nearly all looks so; of what moves some does by chance, as it stops or as windows are
+// narrow.
+constexpr double kFitsAtRest = 0.95, kFitsMoving = 0.35;
+
+// Log-odds of being at rest of what does, or does not, look so.
+double EvidenceOfRest(bool fits) {
+  return fits ? std::log(kFitsAtRest / kFitsMoving) : std::log((1 - kFitsAtRest) / (1 - kFitsMoving));
+}
+
+// The motion of an object tells at most as much as 19 to 1. So it decides about what is parked as often as it
+// drives, and never makes furniture of people, who stand still and go on.
+const double kMostObjectEvidence = std::log(0.95 / 0.05);
+
+// No class is surer than that.
+constexpr double kMostProbability = 0.99;
+
+double Sigmoid(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
+
 double Square(double x) { return x * x; }
 
 double DistanceToSegment(const Eigen::Vector2d& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -51,31 +69,29 @@ DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options
 
 float DynamicFilter::Evidence(float static_probability, bool fits) const {
   if (!options_.landmark_odds || static_probability <= 0 || static_probability >= 1) return 0;
-  // Of what is at rest nearly all fits; of what moves some does by chance, as it stops or as windows are
-  // narrow.
-  constexpr double kFitsAtRest = 0.95, kFitsMoving = 0.35;
-  const double seen =
-      fits ? std::log(kFitsAtRest / kFitsMoving) : std::log((1 - kFitsAtRest) / (1 - kFitsMoving));
   // Frames that follow each other tell nearly the same.
   constexpr double kNews = 0.1;
-  return static_cast<float>(kNews * (seen + std::log(static_probability / (1.0 - static_probability))));
+  return static_cast<float>(
+      kNews * (EvidenceOfRest(fits) + std::log(static_probability / (1.0 - static_probability))));
 }
 
 bool DynamicFilter::IsHidden(const Eigen::Vector2d& ideal_px) const {
-  if (boxes_.empty()) return false;
+  if (objects_.empty()) return false;
   const Eigen::Vector2d px = camera_.Distort(ideal_px);
-  return std::any_of(boxes_.begin(), boxes_.end(),
-                     [&](const DynamicBox& box) { return box.box.Contains(px.x(), px.y()); });
+  return std::any_of(objects_.begin(), objects_.end(), [&](const Object& object) {
+    return object.IsMoving() && object.box.box.Contains(px.x(), px.y());
+  });
 }
 
 void DynamicFilter::Reset() {
-  boxes_.clear();
-  last_boxes_.clear();
+  objects_.clear();
+  last_objects_.clear();
+  object_log_odds_.clear();
 }
 
 std::vector<Box> DynamicFilter::Boxes() const {
   std::vector<Box> boxes;
-  for (const DynamicBox& box : boxes_) boxes.push_back(box.box);
+  for (const Object& object : objects_) boxes.push_back(object.box.box);
   return boxes;
 }
 
@@ -85,19 +101,27 @@ float DynamicFilter::Combine(float prior, float motion_log_odds) const {
 
 DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
                                       const Frame& last, Frame* frame) {
-  last_boxes_.swap(boxes_);
-  boxes_.clear();
+  const bool weights = options_.method == "weights";
+  last_objects_.swap(objects_);
+  objects_.clear();
   if (options_.method != "none") {
     for (const DynamicBox& box : boxes) {
-      if (box.is_dynamic) boxes_.push_back(box);
+      if (!box.is_dynamic) continue;
+      const double p = std::min(box.probability, kMostProbability);
+      const auto odds = object_log_odds_.find(box.track_id);
+      const double motion = odds == object_log_odds_.end() ? 0 : odds->second;
+      objects_.push_back({box, weights ? Sigmoid(std::log(p / (1 - p)) + motion) : 1});
     }
   }
+  std::erase_if(object_log_odds_, [this](const auto& item) {
+    return std::none_of(objects_.begin(), objects_.end(),
+                        [&](const Object& object) { return object.box.track_id == item.first; });
+  });
   const size_t n = frame->features.size();
-  const bool weights = options_.method == "weights";
   frame->static_probability.assign(n, 1.0f);
   frame->motion_log_odds.assign(n, 0.0f);
   prior_.assign(n, 1.0f);
-  if (boxes_.empty()) {
+  if (objects_.empty()) {
     // Nothing is known that could move.
     DynamicKeypoints counts;
     counts.outside = static_cast<int>(n);
@@ -105,33 +129,46 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   }
   std::vector<uint8_t> in_box(n, 0);
   for (size_t i = 0; i < n; ++i) {
-    const Keypoint& keypoint = frame->features.keypoints[i];
-    const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
-    double at_rest = 1;
-    for (const DynamicBox& box : boxes_) {
-      const Box& b = box.box;
-      const double margin_px = weights ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
-      if (!b.Contains(keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
-      in_box[i] = 1;
-      at_rest *= 1 - box.probability * options_.object_share;
-    }
+    bool is_inside = false;
+    const double at_rest = AtRestByBoxes(frame->features.keypoints[i], &is_inside);
+    in_box[i] = is_inside ? 1 : 0;
     if (weights) {
       prior_[i] = static_cast<float>(std::min(at_rest, 1 - options_.missed_object));
       if (const uint32_t from = flow.last_keypoints()[i]; options_.motion && from != KeypointFlow::kNone) {
         frame->motion_log_odds[i] = last.motion_log_odds[from];
       }
       frame->static_probability[i] = Combine(prior_[i], frame->motion_log_odds[i]);
-    } else if (in_box[i] != 0) {
+    } else if (is_inside) {
       frame->static_probability[i] = 0;
     }
   }
-  if (options_.method == "paper" && !boxes_.empty()) JudgeByDisplacement(flow, last, frame);
+  if (options_.method == "paper") JudgeByDisplacement(flow, last, frame);
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
     const bool used = frame->static_probability[i] >= kMinStaticProbability;
     ++(in_box[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
   }
   return counts;
+}
+
+// A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one of
+// these objects, each as likely as the other.
+double DynamicFilter::AtRestByBoxes(const Keypoint& keypoint, bool* in_box) const {
+  const bool weights = options_.method == "weights";
+  const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
+  double belongs_to_none = 1, sum_moves = 0;
+  int boxes = 0;
+  for (const Object& object : objects_) {
+    if (!object.IsMoving()) continue;
+    const Box& b = object.box.box;
+    const double margin_px = weights ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
+    if (!b.Contains(keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
+    belongs_to_none *= 1 - options_.object_share;
+    sum_moves += object.moves;
+    ++boxes;
+  }
+  *in_box = boxes > 0;
+  return boxes == 0 ? 1 : 1 - (1 - belongs_to_none) * sum_moves / boxes;
 }
 
 // Algorithm 2.
@@ -154,32 +191,55 @@ void DynamicFilter::JudgeByDisplacement(const KeypointFlow& flow, const Frame& l
   }
 }
 
-void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
-  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
-  // How each box moved that was there in the last frame too.
-  struct Mover {
-    Box from, to;
-    BoxMotion motion;
-  };
-  std::vector<Box> from, to;
+std::vector<DynamicFilter::Mover> DynamicFilter::FindMovers(const KeypointFlow& flow) const {
+  std::vector<Mover> movers;
+  std::vector<Box> from;
   std::vector<Eigen::Vector2d> expected;
-  for (const DynamicBox& box : boxes_) {
-    for (const DynamicBox& before : last_boxes_) {
-      if (before.track_id != box.track_id) continue;
-      from.push_back(before.box);
-      to.push_back(box.box);
-      expected.emplace_back(to.back().CenterX() - from.back().CenterX(),
-                            to.back().CenterY() - from.back().CenterY());
+  for (const Object& object : objects_) {
+    for (const Object& before : last_objects_) {
+      if (before.box.track_id != object.box.track_id) continue;
+      const Box &a = before.box.box, &b = object.box.box;
+      movers.push_back({object.box.track_id, a, b, {}});
+      from.push_back(a);
+      expected.emplace_back(b.CenterX() - a.CenterX(), b.CenterY() - a.CenterY());
     }
   }
   const std::vector<std::vector<PointMotion>> shared = ShareMotions(from, expected, flow.motions());
-  std::vector<Mover> movers;
-  for (size_t k = 0; k < from.size(); ++k) {
-    if (const auto motion = MotionOfBox(from[k], shared[k])) movers.push_back({from[k], to[k], *motion});
+  size_t found = 0;
+  for (size_t k = 0; k < movers.size(); ++k) {
+    const auto motion = MotionOfBox(from[k], shared[k]);
+    if (!motion) continue;
+    movers[found] = movers[k];
+    movers[found++].motion = *motion;
   }
-  if (movers.empty()) return;
+  movers.resize(found);
+  return movers;
+}
 
+// Whether the object as a whole moved. Where what is at rest shows no parallax, neither does an object that is
+// far off or that drives ahead.
+void DynamicFilter::WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth) {
+  const Eigen::Vector2d raw(mover.from.CenterX(), mover.from.CenterY());
+  const Eigen::Vector2d before_px = camera_.Undistort(raw);
+  const Eigen::Vector3d far = frame_from_last.rotation * camera_.Unproject(before_px);
+  const Eigen::Vector3d near = nearest_depth * far + frame_from_last.translation;
+  if (far.z() <= 0 || near.z() <= 0) return;
+  const Eigen::Vector2d far_px = camera_.Project(far), near_px = camera_.Project(near);
+  const Eigen::Vector2d moved_px = before_px + mover.motion.shift_px;
+  const double sigma_px = std::numbers::sqrt2;
+  const bool moves = DistanceToSegment(moved_px, far_px, near_px) > kApart * sigma_px;
+  if (!moves && (moved_px - far_px).norm() < kApart * sigma_px) return;
+  double& odds = object_log_odds_[mover.track_id];
+  odds = std::clamp(odds - EvidenceOfRest(!moves), -kMostObjectEvidence, kMostObjectEvidence);
+}
+
+void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
+  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
+  const std::vector<Mover> movers = FindMovers(flow);
+  if (movers.empty()) return;
   const Rigid3 frame_from_last = frame->cam_from_world * last.cam_from_world.Inverse();
+  const double nearest_depth = kNearestDepthRatio * median_depth;
+  for (const Mover& mover : movers) WatchObject(mover, frame_from_last, nearest_depth);
   const Eigen::Matrix3d rotation = frame_from_last.Matrix();
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
     if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
@@ -189,7 +249,7 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
     // At rest, it lies on the epipolar line between where infinity and the nearest depth go.
     const Eigen::Vector3d ray = camera_.Unproject(before_px);
     const Eigen::Vector3d far = rotation * ray;
-    const Eigen::Vector3d near = kNearestDepthRatio * median_depth * far + frame_from_last.translation;
+    const Eigen::Vector3d near = nearest_depth * far + frame_from_last.translation;
     if (far.z() <= 0 || near.z() <= 0) continue;
     const Eigen::Vector2d far_px = camera_.Project(far), near_px = camera_.Project(near);
     // Noise of both ends.

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <map>
 #include <span>
 #include <vector>
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/semantics/dynamic_score.h"
+#include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/tracking/dynamic_options.h"
 #include "dynamic_slam/tracking/keypoint_flow.h"
 
@@ -34,10 +36,11 @@ class DynamicFilter {
   // the object. Changes frame->static_probability.
   void Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame);
 
-  // The dynamic boxes of the last Judge.
+  // The boxes of the last Judge that are to be watched: of dynamic objects, and of those like a parked car
+  // whose class is dynamic and which do not move.
   std::vector<Box> Boxes() const;
 
-  // Whether a point of the frame (ideal px) is in one of its dynamic boxes.
+  // Whether a point of the frame (ideal px) is in the box of something that moves.
   bool IsHidden(const Eigen::Vector2d& ideal_px) const;
 
   // What a frame adds to the log-odds of a landmark that was matched with a keypoint, and fits the pose or
@@ -47,18 +50,37 @@ class DynamicFilter {
   // Forgets the boxes of earlier frames.
   void Reset();
 
-  bool HasBoxes() const { return !boxes_.empty(); }
+  bool HasBoxes() const { return !objects_.empty(); }
 
   const DynamicOptions& options() const { return options_; }
 
  private:
+  // Something whose class is dynamic.
+  struct Object {
+    DynamicBox box;
+    double moves;  // P(moves) by its class and its motion so far
+
+    bool IsMoving() const { return moves >= 0.5; }
+  };
+
+  // An object that is in the last frame too, and how it moved in the image.
+  struct Mover {
+    int track_id;
+    Box from, to;
+    BoxMotion motion;
+  };
+
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
+  double AtRestByBoxes(const Keypoint& keypoint, bool* in_box) const;
+  std::vector<Mover> FindMovers(const KeypointFlow& flow) const;
+  void WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth);
 
   Camera camera_;
   DynamicOptions options_;
   std::vector<float> octave_scales_;
-  std::vector<DynamicBox> boxes_, last_boxes_;
+  std::vector<Object> objects_, last_objects_;
+  std::map<int, double> object_log_odds_;  // of moving, by track id: what their motion tells beside the class
   std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
 };
 

@@ -62,13 +62,24 @@ class DynamicFilterTest : public ::testing::Test {
   }
 
   // Both frames, the pose known after the second one.
-  DynamicKeypoints Run(DynamicFilter* filter) {
+  DynamicKeypoints Run(DynamicFilter* filter) { return Run(filter, Person(0), Person(kPersonPx)); }
+
+  DynamicKeypoints Run(DynamicFilter* filter, const DynamicBox& before, const DynamicBox& now) {
     flow_.Clear(last_);
-    filter->Judge(std::vector{Person(0)}, flow_, frame_, &last_);
+    filter->Judge(std::vector{before}, flow_, frame_, &last_);
     flow_.Match(last_, filter->Boxes(), {}, frame_);
-    const DynamicKeypoints counts = filter->Judge(std::vector{Person(kPersonPx)}, flow_, last_, &frame_);
+    const DynamicKeypoints counts = filter->Judge(std::vector{now}, flow_, last_, &frame_);
     filter->Watch(flow_, last_, kDepth, &frame_);
     return counts;
+  }
+
+  // Something that moves by shift_px, as likely as not by its class.
+  static DynamicBox Car(double x, double shift_px) {
+    DynamicBox box = Person(0);
+    box.box = {x + shift_px, 100, 160, 200};
+    box.track_id = 2;
+    box.probability = 0.6;
+    return box;
   }
 
   bool IsInBox(size_t i) const {
@@ -106,6 +117,49 @@ class DynamicFilterTest : public ::testing::Test {
   KeypointFlow flow_{camera_, OctaveScales()};
   std::vector<bool> on_person_;
 };
+
+TEST_F(DynamicFilterTest, ACarThatDoesNotMoveIsParked) {
+  DynamicFilter filter = Make("weights");
+  const double wall_px = -camera_.fx * kShift / kDepth;
+  const DynamicKeypoints first = Run(&filter, Car(430, 0), Car(430, wall_px));
+  EXPECT_GT(first.InBoxes(), 20) << "nobody knows yet";
+  for (int i = 0; i < 3; ++i) Run(&filter, Car(430, 0), Car(430, wall_px));
+  const DynamicKeypoints later = Run(&filter, Car(430, 0), Car(430, wall_px));
+  EXPECT_EQ(later.InBoxes(), 0);
+  EXPECT_FALSE(filter.IsHidden({500, 200}));
+  EXPECT_EQ(filter.Boxes().size(), 1u) << "it is watched on";
+}
+
+TEST_F(DynamicFilterTest, ACarThatDrivesCountsAsMovingForSure) {
+  DynamicFilter filter = Make("weights");
+  const DynamicKeypoints first = Run(&filter, Car(200, 0), Car(200, kPersonPx));
+  EXPECT_GT(first.kept, 0) << "nobody knows yet";
+  const DynamicKeypoints later = Run(&filter, Car(200, 0), Car(200, kPersonPx));
+  EXPECT_GT(later.culled, 2 * later.kept);
+}
+
+TEST_F(DynamicFilterTest, APersonWhoStandsStillRemainsAPerson) {
+  DynamicFilter filter = Make("weights");
+  const double wall_px = -camera_.fx * kShift / kDepth;
+  DynamicBox before = Car(430, 0), now = Car(430, wall_px);
+  before.probability = now.probability = 1;
+  DynamicKeypoints counts;
+  for (int i = 0; i < 30; ++i) counts = Run(&filter, before, now);
+  EXPECT_GT(counts.InBoxes(), 20);
+  EXPECT_TRUE(filter.IsHidden({500, 200}));
+}
+
+TEST_F(DynamicFilterTest, WithoutParallaxACarTellsNothing) {
+  DynamicFilter filter = Make("weights");
+  frame_.cam_from_world = Rigid3();  // the camera stands still, and so does what is in the box
+  for (size_t i = 0; i < frame_.features.size(); ++i) {
+    frame_.features.keypoints[i].raw_x = frame_.features.keypoints[i].x = last_.features.keypoints[i].x;
+  }
+  frame_.grid.Build(frame_.features, camera_.IdealBounds());
+  DynamicKeypoints counts;
+  for (int i = 0; i < 5; ++i) counts = Run(&filter, Car(430, 0), Car(430, 0));
+  EXPECT_GT(counts.InBoxes(), 20);
+}
 
 TEST_F(DynamicFilterTest, WithoutDynamicObjectsEverythingIsTrusted) {
   DynamicFilter filter = Make("weights");
