@@ -26,5 +26,6 @@ class Id {
 using FrameId = Id<struct FrameTag>;
 using KeyframeId = Id<struct KeyframeTag>;
 using LandmarkId = Id<struct LandmarkTag>;
+using PartId = Id<struct PartTag>;  // of the map (Map)
 
 }  // namespace dynamic_slam

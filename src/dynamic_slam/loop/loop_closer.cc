@@ -49,32 +49,55 @@ void LoopCloser::Close(const Loop& loop, const std::function<bool()>& should_sto
     return map.epoch() == epoch_ && map.keyframes().Contains(loop.keyframe) &&
            map.keyframes().Contains(loop.candidate);
   };
+  const auto is_one_part = [&](const Map& map) {
+    return map.keyframes().At(loop.keyframe).part() == map.keyframes().At(loop.candidate).part();
+  };
+  bool joins = false;
   std::optional<LoopCorrection> correction;
   std::string& reason = result->attempts.back().reason;
   if (loop.has_drifted) {
     {
       const auto map = map_->Read();
       revision = map->revision();
-      if (is_there(*map)) correction.emplace(*map, loop, options_, loops_);
+      joins = is_there(*map) && !is_one_part(*map);
+      if (is_there(*map) && !joins) correction.emplace(*map, loop, options_, loops_);
     }
-    if (!correction.has_value() || !correction->Solve(should_stop)) {
+    if (!joins && (!correction.has_value() || !correction->Solve(should_stop))) {
       reason = "the correction was stopped, or failed";
       return;
     }
   }
   const auto map = map_->Write();
-  if (!is_there(*map) || (correction.has_value() && map->revision() != revision)) {
+  if (!is_there(*map) || (loop.has_drifted && map->revision() != revision)) {
     reason = "the map has changed meanwhile";
     return;
   }
-  if (correction.has_value()) {
-    correction->Apply(map.get());
+  if (loop.has_drifted) {
+    if (joins) {
+      JoinParts(loop, map.get());
+      result->joined = true;
+    } else {
+      correction->Apply(map.get());
+    }
     loops_.emplace_back(loop.keyframe, loop.candidate);
     keyframes_since_loop_ = 0;
     result->corrected = true;
   }
   result->landmarks_merged = Merge(loop, map.get());
   result->linked = true;
+}
+
+void LoopCloser::JoinParts(const Loop& loop, Map* map) const {
+  const Keyframe& keyframe = map->keyframes().At(loop.keyframe);
+  const Keyframe& candidate = map->keyframes().At(loop.candidate);
+  const Sim3 here_from_there = ToSim3(keyframe.cam_from_world()).Inverse() * loop.keyframe_from_candidate *
+                               ToSim3(candidate.cam_from_world());
+  const PartId here = keyframe.part(), there = candidate.part();
+  if (here < there) {
+    map->MergePart(there, here, here_from_there);
+  } else {
+    map->MergePart(here, there, here_from_there.Inverse());
+  }
 }
 
 int LoopCloser::Merge(const Loop& loop, Map* map) {

@@ -15,11 +15,13 @@ struct LoopResult {
   std::vector<LoopAttempt> attempts;
   bool linked = false;     // the keyframe was linked to the old landmarks
   bool corrected = false;  // and the map was moved, so that they fit
+  bool joined = false;     // and two parts of the map became one by it
   int landmarks_merged = 0;
 };
 
 // Looks for a loop at each keyframe that local mapping has done, and closes it: the essential graph is
-// optimised over similarities, points move with their keyframes, landmarks that are one are merged.
+// optimised over similarities, points move with their keyframes, landmarks that are one are merged. Where the
+// old place is in another part of the map, the younger part is moved to it as it is.
 // Synchronous; holds the map's lock for moments, and one to move everything. What mapping and tracking
 // compute meanwhile from the map of before they drop, or put right (Map::revision).
 class LoopCloser {
@@ -32,6 +34,7 @@ class LoopCloser {
 
  private:
   void Close(const Loop& loop, const std::function<bool()>& should_stop, LoopResult* result);
+  void JoinParts(const Loop& loop, Map* map) const;
   int Merge(const Loop& loop, Map* map);
 
   LoopOptions options_;

@@ -21,12 +21,14 @@ constexpr double kLoopFactor = 10;
 
 LoopCorrection::LoopCorrection(const Map& map, const Loop& loop, const LoopOptions& options,
                                const std::vector<std::pair<KeyframeId, KeyframeId>>& older_loops)
-    : options_(options), node_of_(map.keyframes().CreatedCount(), kNone) {
+    : options_(options),
+      part_(map.keyframes().At(loop.keyframe).part()),
+      node_of_(map.keyframes().CreatedCount(), kNone) {
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
+    if (keyframe.part() != part_) return;
     node_of_[keyframe.id().value()] = static_cast<uint32_t>(graph_.nodes.size());
     old_from_world_.push_back(ToSim3(keyframe.cam_from_world()));
-    // The oldest is the origin of the world.
-    graph_.nodes.push_back({old_from_world_.back(), graph_.nodes.empty()});
+    graph_.nodes.push_back({old_from_world_.back(), map.IsOrigin(keyframe.id())});
   });
   const auto now = [&](KeyframeId first, KeyframeId second) {
     return ToSim3(map.keyframes().At(first).cam_from_world() *
@@ -34,6 +36,7 @@ LoopCorrection::LoopCorrection(const Map& map, const Loop& loop, const LoopOptio
   };
   KeyframeId previous;
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
+    if (keyframe.part() != part_) return;
     CovisibleKeyframe parent;
     for (const CovisibleKeyframe& other : keyframe.BestCovisible(keyframe.covisible().size())) {
       if (other.id < keyframe.id()) {
@@ -54,12 +57,16 @@ LoopCorrection::LoopCorrection(const Map& map, const Loop& loop, const LoopOptio
     previous = keyframe.id();
   });
   for (const auto& [first, second] : older_loops) {
-    if (map.keyframes().Contains(first) && map.keyframes().Contains(second)) {
+    if (HasNode(first) && HasNode(second)) {
       AddEdge(first, second, now(first, second), options_.min_inliers);
     }
   }
   AddEdge(loop.keyframe, loop.candidate, loop.keyframe_from_candidate,
           kLoopFactor * static_cast<double>(loop.links.size()));
+}
+
+bool LoopCorrection::HasNode(KeyframeId keyframe) const {
+  return keyframe.value() < node_of_.size() && node_of_[keyframe.value()] != kNone;
 }
 
 void LoopCorrection::AddEdge(KeyframeId first, KeyframeId second, const Sim3& first_from_second,
@@ -77,7 +84,11 @@ std::vector<std::optional<Sim3>> LoopCorrection::NewFromOldWorld(const Map& map)
   std::optional<Sim3> latest;
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
     const uint32_t id = keyframe.id().value();
-    if (id < node_of_.size() && node_of_[id] != kNone) {
+    if (keyframe.part() != part_) {
+      new_from_old[id] = Sim3();
+      return;
+    }
+    if (HasNode(keyframe.id())) {
       const uint32_t node = node_of_[id];
       new_from_old[id] = graph_.nodes[node].node_from_world.Inverse() * old_from_world_[node];
     } else {

@@ -10,7 +10,7 @@
 
 namespace dynamic_slam {
 
-// The essential graph of a map (Mur-Artal et al. 2015, section III-D): a spanning tree over the keyframes,
+// The essential graph of a part of the map (Mur-Artal et al. 2015, section III-D): a spanning tree over the keyframes,
 // those that share much, and loops; and what its optimisation does to the map. Keyframes and landmarks that
 // came in the meantime go along with what is around them.
 class LoopCorrection {
@@ -26,11 +26,13 @@ class LoopCorrection {
   void Apply(Map* map) const;
 
  private:
+  bool HasNode(KeyframeId keyframe) const;
   void AddEdge(KeyframeId first, KeyframeId second, const Sim3& first_from_second, double weight);
   // By keyframe id, of those that the map has now.
   std::vector<std::optional<Sim3>> NewFromOldWorld(const Map& map) const;
 
   LoopOptions options_;
+  PartId part_;
   PoseGraph graph_;
   std::vector<Sim3> old_from_world_;  // by node
   std::vector<uint32_t> node_of_;     // by keyframe id

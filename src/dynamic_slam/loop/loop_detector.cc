@@ -224,7 +224,7 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
   attempt->inliers = static_cast<int>(loop.links.size());
   attempt->scale = loop.keyframe_from_candidate.scale;
   attempt->drift_px = Median(drifts_px);
-  loop.has_drifted = attempt->drift_px >= options_.min_drift_px;
+  loop.has_drifted = keyframe.part() != candidate.part() || attempt->drift_px >= options_.min_drift_px;
   if (attempt->inliers < options_.min_inliers) {
     attempt->reason = fmt::format("{} landmarks found < {}", attempt->inliers, options_.min_inliers);
     return loop;

@@ -41,7 +41,7 @@ struct Frame {
 
 class Map;
 
-// Makes the frame a keyframe that sees the frame's landmarks.
-KeyframeId InsertKeyframe(const Frame& frame, Map* map);
+// Makes the frame a keyframe that sees the frame's landmarks, in a part of the map.
+KeyframeId InsertKeyframe(const Frame& frame, Map* map, PartId part = PartId(0));
 
 }  // namespace dynamic_slam

@@ -21,7 +21,8 @@ struct CovisibleKeyframe {
 class Keyframe {
  public:
   Keyframe(KeyframeId id, FrameId frame_id, double timestamp_s, const Rigid3& cam_from_world,
-           FeatureSet features, KeypointGrid grid, std::vector<float> static_probability = {})
+           FeatureSet features, KeypointGrid grid, std::vector<float> static_probability = {},
+           PartId part = PartId(0))
       : id_(id),
         frame_id_(frame_id),
         timestamp_s_(timestamp_s),
@@ -29,10 +30,12 @@ class Keyframe {
         features_(std::move(features)),
         grid_(std::move(grid)),
         static_probability_(std::move(static_probability)),
+        part_(part),
         landmarks_(features_.size()) {}
 
   KeyframeId id() const { return id_; }
   FrameId frame_id() const { return frame_id_; }
+  PartId part() const { return part_; }  // of the map
   double timestamp_s() const { return timestamp_s_; }
 
   const Rigid3& cam_from_world() const { return cam_from_world_; }
@@ -77,6 +80,7 @@ class Keyframe {
   FeatureSet features_;
   KeypointGrid grid_;
   std::vector<float> static_probability_;
+  PartId part_;
   std::vector<LandmarkId> landmarks_;
   int landmark_count_ = 0;
   std::vector<CovisibleKeyframe> covisible_;

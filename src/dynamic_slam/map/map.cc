@@ -45,12 +45,71 @@ void Map::Reset() {
 }
 
 Keyframe& Map::AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world,
-                           FeatureSet features, KeypointGrid grid, std::vector<float> static_probability) {
+                           FeatureSet features, KeypointGrid grid, std::vector<float> static_probability,
+                           PartId part) {
   std::vector<uint64_t> words = PlaceWords(features, static_probability, kMinStaticProbability);
   Keyframe& keyframe = keyframes_.Emplace(frame, timestamp_s, cam_from_world, std::move(features),
-                                          std::move(grid), std::move(static_probability));
+                                          std::move(grid), std::move(static_probability), part);
+  KeyframeId& origin = origins_.at(part.value());
+  if (!origin.IsValid()) origin = keyframe.id();
   places_.Add(keyframe.id(), std::move(words));
   return keyframe;
+}
+
+PartId Map::BeginPart() {
+  if (keyframes_.size() > 0 || origins_.back().IsValid()) origins_.emplace_back();
+  return PartId(static_cast<uint32_t>(origins_.size() - 1));
+}
+
+std::vector<PartId> Map::Parts() const {
+  std::vector<PartId> parts;
+  for (uint32_t part = 0; part < origins_.size(); ++part) {
+    if (keyframes_.Contains(origins_[part])) parts.emplace_back(part);
+  }
+  return parts;
+}
+
+bool Map::IsOrigin(KeyframeId id) const { return origins_[keyframes_.At(id).part().value()] == id; }
+
+void Map::ErasePart(PartId part) {
+  ++epoch_;
+  BeginRevision();
+  std::vector<LandmarkId> landmarks;
+  landmarks_.ForEach([&](const Landmark& landmark) {
+    if (landmark.observations().empty()) return;
+    if (keyframes_.At(landmark.observations().front().keyframe).part() == part) {
+      landmarks.push_back(landmark.id());
+    }
+  });
+  for (const LandmarkId id : landmarks) EraseLandmark(id);
+  std::vector<KeyframeId> keyframes;
+  keyframes_.ForEach([&](const Keyframe& keyframe) {
+    if (keyframe.part() == part) keyframes.push_back(keyframe.id());
+  });
+  heirs_.resize(keyframes_.CreatedCount());
+  for (const KeyframeId id : keyframes) {
+    keyframes_.Erase(id);
+    places_.Erase(id);
+  }
+}
+
+void Map::MergePart(PartId from, PartId into, const Sim3& into_from_from) {
+  DS_CHECK(from != into, "part={}", from.value());
+  BeginRevision();
+  landmarks_.ForEach([&](Landmark& landmark) {
+    if (landmark.observations().empty()) return;
+    if (keyframes_.At(landmark.observations().front().keyframe).part() == from) {
+      landmark.Transform(into_from_from);
+    }
+  });
+  const Sim3 from_from_into = into_from_from.Inverse();
+  keyframes_.ForEach([&](Keyframe& keyframe) {
+    if (keyframe.part() != from) return;
+    keyframe.set_cam_from_world(ToRigid3(ToSim3(keyframe.cam_from_world()) * from_from_into));
+    keyframe.Rescale(into_from_from.scale);
+    keyframe.part_ = into;
+  });
+  origins_[from.value()] = KeyframeId();
 }
 
 void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id) {
@@ -175,7 +234,7 @@ void Map::RefreshLandmark(LandmarkId id) {
 
 Map::Anchor Map::ResolveKeyframe(KeyframeId id) const {
   Anchor anchor{id, Sim3()};
-  while (!keyframes_.Contains(anchor.keyframe)) {
+  while (anchor.keyframe.IsValid() && !keyframes_.Contains(anchor.keyframe)) {
     DS_CHECK(anchor.keyframe.value() < heirs_.size(), "id={}", id.value());
     const Anchor& heir = heirs_[anchor.keyframe.value()];
     anchor = {heir.keyframe, anchor.original_from_keyframe * heir.original_from_keyframe};
@@ -188,6 +247,11 @@ Rigid3 Map::PoseFromReference(KeyframeId reference, const Rigid3& cam_from_refer
   const Sim3 own_from_world = ToSim3(cam_from_reference) * anchor.original_from_keyframe *
                               OwnFromWorld(keyframes_.At(anchor.keyframe));
   return ToRigid3(own_from_world);
+}
+
+PartId Map::PartOf(KeyframeId reference) const {
+  const Keyframe* keyframe = keyframes_.Find(ResolveKeyframe(reference).keyframe);
+  return keyframe != nullptr ? keyframe->part() : PartId();
 }
 
 double Map::UnitOf(KeyframeId reference) const {
@@ -219,6 +283,10 @@ std::vector<std::string> Map::Validate() const {
     KeyframeId previous;
     for (const Observation& observation : landmark.observations()) {
       const Keyframe* keyframe = keyframes_.Find(observation.keyframe);
+      if (keyframe != nullptr &&
+          keyframe->part() != keyframes_.At(landmark.observations().front().keyframe).part()) {
+        problems.push_back(fmt::format("landmark {}: seen in two parts of the map", id));
+      }
       if (previous.IsValid() && observation.keyframe <= previous) {
         problems.push_back(fmt::format("landmark {}: observations are not in the order of keyframes", id));
       }
@@ -247,6 +315,10 @@ std::vector<std::string> Map::Validate() const {
         problems.push_back(
             fmt::format("keyframe {}: keypoint {} links a landmark that does not link back", id, keypoint));
       }
+    }
+    if (!keyframes_.Contains(origins_[keyframe.part().value()]) ||
+        keyframes_.At(origins_[keyframe.part().value()]).part() != keyframe.part()) {
+      problems.push_back(fmt::format("keyframe {}: its part has no origin", id));
     }
     if (count != keyframe.LandmarkCount())
       problems.push_back(fmt::format("keyframe {}: counts its landmarks wrongly", id));

@@ -14,6 +14,9 @@ namespace dynamic_slam {
 
 // Keyframes, landmarks and who sees what: the one object that the stages share.
 //
+// Where tracking was lost and started anew, the map has several parts. Each has an origin and a unit of length
+// of its own, and no landmark in common with another, until a place is known again and they become one.
+//
 // Each link between a keypoint and a landmark is kept on both sides, and each pair of keyframes knows how
 // many landmarks it shares; both hold after every call.
 class Map {
@@ -22,7 +25,7 @@ class Map {
   explicit Map(std::vector<float> octave_scales) : octave_scales_(std::move(octave_scales)) {}
 
   // Empties the map. Ids start again from 0, so that those of before mean nothing any more: whoever keeps ids
-  // while the map is unlocked compares the epoch.
+  // while the map is unlocked compares the epoch, which changes with ErasePart too.
   void Reset();
   uint32_t epoch() const { return epoch_; }
 
@@ -32,7 +35,23 @@ class Map {
   void BeginRevision() { ++revision_; }
 
   Keyframe& AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world, FeatureSet features,
-                        KeypointGrid grid, std::vector<float> static_probability = {});
+                        KeypointGrid grid, std::vector<float> static_probability = {},
+                        PartId part = PartId(0));
+
+  // A new part, which the next keyframe that is added to it is the origin of.
+  PartId BeginPart();
+
+  // Parts with keyframes, oldest first.
+  std::vector<PartId> Parts() const;
+
+  // Whether the keyframe is the first of its part: nothing moves it but MergePart.
+  bool IsOrigin(KeyframeId id) const;
+
+  // Frames that hang on keyframes of the part have no pose any more.
+  void ErasePart(PartId part);
+
+  // The part `from` becomes a piece of `into`, moved and scaled.
+  void MergePart(PartId from, PartId into, const Sim3& into_from_from);
 
   Landmark& AddLandmark(const Eigen::Vector3d& position, KeyframeId created_by) {
     return landmarks_.Emplace(position, created_by);
@@ -58,17 +77,20 @@ class Map {
   // Recomputes normal, distances and descriptor from the observations.
   void RefreshLandmark(LandmarkId id);
 
-  // The keyframe a frame hangs on now, and the pose of the one it was made with in it, each in units of its
-  // own.
+  // The keyframe a frame hangs on now, not valid when its part is gone, and the pose of the one it was made
+  // with in it, each in units of its own.
   struct Anchor {
     KeyframeId keyframe;
     Sim3 original_from_keyframe;
   };
   Anchor ResolveKeyframe(KeyframeId id) const;
 
-  // Pose of a frame that was tracked relative to `reference`, after all that has happened to the map since.
-  // cam_from_reference: in units of the reference (Keyframe::unit).
+  // Pose of a frame that was tracked relative to `reference`, after all that has happened to the map since;
+  // its part must not be gone. cam_from_reference: in units of the reference (Keyframe::unit).
   Rigid3 PoseFromReference(KeyframeId reference, const Rigid3& cam_from_reference) const;
+
+  // The part of the map in which such a frame is; not valid when it is gone.
+  PartId PartOf(KeyframeId reference) const;
 
   // The unit of a keyframe, and of the keyframe's heir for one that is gone.
   double UnitOf(KeyframeId reference) const;
@@ -94,6 +116,7 @@ class Map {
   IdTable<KeyframeId, Keyframe> keyframes_;
   IdTable<LandmarkId, Landmark> landmarks_;
   PlaceIndex places_;
+  std::vector<KeyframeId> origins_{KeyframeId()};  // by part
   std::vector<LandmarkId> merged_into_;  // by landmark id; filled as far as needed
   std::vector<Anchor> heirs_;            // by keyframe id; not valid while the keyframe lives
 };

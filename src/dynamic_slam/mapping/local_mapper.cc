@@ -118,9 +118,11 @@ bool LocalMapper::CullRedundantKeyframes(KeyframeId current, MappingResult* resu
   for (size_t i = 0; valid && i < neighbours.size(); ++i) {
     // Neither the origin of the world nor what still waits to be processed.
     const KeyframeId id = neighbours[i].id;
-    if (id == KeyframeId(0) || current < id) continue;
+    if (current < id) continue;
     bool is_redundant = false;
-    valid = Look([&](const Map& map) { is_redundant = IsRedundant(map, map.keyframes().At(id)); });
+    valid = Look([&](const Map& map) {
+      is_redundant = !map.IsOrigin(id) && IsRedundant(map, map.keyframes().At(id));
+    });
     if (!valid || !is_redundant) continue;
     valid = Change([&](Map* map) {
       map->EraseKeyframe(id, map->keyframes().At(id).BestCovisible(1).front().id);

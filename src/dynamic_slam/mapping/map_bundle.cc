@@ -156,10 +156,9 @@ MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& ma
   if (fixed.size() > static_cast<size_t>(options.fixed_keyframes)) {
     fixed.resize(static_cast<size_t>(options.fixed_keyframes));
   }
-  // The first keyframe is the origin of the world. With fewer than two outside to hold the others, the oldest
-  // does.
+  // With fewer than two outside to hold the others, the oldest does.
   const KeyframeId oldest = *std::min_element(local.begin(), local.end());
-  const bool oldest_is_fixed = oldest == KeyframeId(0) || fixed.size() < 2;
+  const bool oldest_is_fixed = map.IsOrigin(oldest) || fixed.size() < 2;
   for (const KeyframeId keyframe : local) {
     bundle.AddPose(map, keyframe, oldest_is_fixed && keyframe == oldest);
   }
@@ -171,11 +170,9 @@ MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& ma
 MapBundle WholeBundle(const Map& map) {
   MapBundle bundle(map);
   bundle.SetWhole();
-  bool first = true;
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
-    bundle.AddPose(map, keyframe.id(), first);
+    bundle.AddPose(map, keyframe.id(), map.IsOrigin(keyframe.id()));
     bundle.AddLandmarksOf(map, keyframe.id());
-    first = false;
   });
   bundle.AddObservations(map);
   return bundle;

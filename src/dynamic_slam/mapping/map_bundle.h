@@ -18,7 +18,7 @@ namespace dynamic_slam {
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
                           uint32_t epoch, const std::function<bool()>& should_stop, SharedMap* map);
 
-// The same of the whole map, the oldest keyframe fixed.
+// The same of the whole map, the origin of each part fixed.
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
                         const std::function<bool()>& should_stop, SharedMap* map);
 

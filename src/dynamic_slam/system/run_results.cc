@@ -32,6 +32,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   json["coverage"] = summary.Coverage();
   json["keyframes"] = summary.keyframes;
   json["landmarks"] = summary.landmarks;
+  json["maps"] = summary.maps;
   if (summary.initialised_at.has_value()) {
     json["initialised_at"] = *summary.initialised_at;
   } else {
@@ -54,6 +55,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                      {"most_keyframes_waiting", summary.most_keyframes_waiting}};
   json["loops"] = {
       {"corrected", summary.loops.corrected},
+      {"joined", summary.loops.joined},
       {"linked", summary.loops.linked},
       {"refused", std::count_if(summary.loops.attempts.begin(), summary.loops.attempts.end(),
                                 [](const LoopAttempt& attempt) { return !attempt.reason.empty(); })},
@@ -115,6 +117,20 @@ std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
   return csv;
 }
 
+// Those of further parts of the map; files of an earlier run in the folder go.
+void WriteFurtherTrajectories(const std::filesystem::path& folder, const SlamSystem& system) {
+  const std::vector<PartId> parts = system.Parts();
+  for (size_t i = 1;; ++i) {
+    const std::filesystem::path file = folder / fmt::format("trajectory_{}.txt", i + 1);
+    std::error_code ignored;
+    if (i < parts.size()) {
+      WriteTumTrajectory(file, system.FrameTrajectory(parts[i]));
+    } else if (!std::filesystem::remove(file, ignored)) {
+      return;
+    }
+  }
+}
+
 }  // namespace
 
 TimeStatistics SummariseTimes(std::vector<double> times) {
@@ -152,6 +168,7 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
   PrepareOutputFolder(folder);
   const Trajectory trajectory = system.FrameTrajectory();
   WriteTumTrajectory(folder / "trajectory.txt", trajectory);
+  WriteFurtherTrajectories(folder, system);
   WriteTumTrajectory(folder / "keyframes.txt", system.KeyframeTrajectory());
   const std::filesystem::path kitti = folder / "trajectory_kitti.txt";
   std::error_code ignored;

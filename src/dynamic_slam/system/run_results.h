@@ -28,6 +28,7 @@ struct RunSummary {
   size_t frames_backfilled = 0;  // given one later: those before the start of which the map was made
   size_t frames_dropped = 0;     // realtime: came while tracking was late
   size_t keyframes = 0, landmarks = 0;
+  size_t maps = 0;                       // parts of the map that nothing ties together
   std::optional<size_t> initialised_at;  // frame, counted from 0
   int lost_count = 0;                    // times that tracking was lost
   int reset_count = 0;         // times that a map was given up: lost while small, or started wrongly
@@ -69,7 +70,7 @@ struct RunSummary {
 // What `failure` says; "" when there is none.
 std::string FailureMessage(const RunSummary& summary);
 
-// Writes trajectory.txt, keyframes.txt, frames.csv, loops.csv, map.ply, config.yaml, summary.json and, for a
+// Writes trajectory.txt, trajectory_2.txt and so on for further parts of the map, keyframes.txt, frames.csv, loops.csv, map.ply, config.yaml, summary.json and, for a
 // KITTI source in which every frame has a pose, trajectory_kitti.txt into the folder, which is made. Throws
 // InputError when that is not possible.
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);

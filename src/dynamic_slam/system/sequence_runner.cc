@@ -47,7 +47,7 @@ class FrameLog {
   void Add(double timestamp_s, const FrameResult& result) {
     const TrackingResult& tracking = result.tracking;
     const bool is_tracking = tracking.state == TrackingState::kTracking;
-    if (tracking.map_was_reset) {
+    if (tracking.part_was_erased) {
       ++summary_->reset_count;
       summary_->initialised_at.reset();
     }
@@ -138,6 +138,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
     const auto map = system.map().Read();
     summary.keyframes = map->keyframes().size();
     summary.landmarks = map->landmarks().size();
+    summary.maps = map->Parts().size();
   }
   summary.mapping = system.mapping_report();
   summary.loops = system.loop_report();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <utility>
 
 #include "dynamic_slam/base/error.h"
@@ -70,7 +71,10 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   }
   result.tracking_ms = MillisecondsSince(start) - asking_ms;
 
-  if (result.tracking.map_was_reset) tracked_.clear();
+  if (result.tracking.part_was_erased) {
+    const auto map = map_.Read();
+    std::erase_if(tracked_, [&](const TrackedFrame& f) { return !map->PartOf(f.reference).IsValid(); });
+  }
   if (result.tracking.state == TrackingState::kTracking) {
     const Frame& frame = tracker_.frame();
     for (const EarlierFrame& earlier : result.tracking.earlier_frames) {
@@ -127,6 +131,7 @@ void SlamSystem::CloseLoop(const MappedKeyframe& keyframe, const std::stop_token
   report->attempts.insert(report->attempts.end(), result.attempts.begin(), result.attempts.end());
   report->linked += result.linked && !result.corrected;
   report->corrected += result.corrected;
+  report->joined += result.joined;
   report->landmarks_merged += result.landmarks_merged;
   report->bundles += bundle.has_value();
   report->bundles_stopped += bundle.has_value() && bundle->stopped;
@@ -166,11 +171,28 @@ void SlamSystem::Reset() {
   is_stopped_ = false;
 }
 
-Trajectory SlamSystem::FrameTrajectory() const {
+std::vector<PartId> SlamSystem::Parts() const {
+  const auto map = map_.Read();
+  std::vector<PartId> parts = map->Parts();
+  std::map<PartId, size_t> frames;
+  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.reference)];
+  std::stable_sort(parts.begin(), parts.end(), [&](PartId a, PartId b) { return frames[a] > frames[b]; });
+  return parts;
+}
+
+PartId SlamSystem::OrMain(PartId part) const {
+  if (part.IsValid()) return part;
+  const std::vector<PartId> parts = Parts();
+  return parts.empty() ? PartId() : parts.front();
+}
+
+Trajectory SlamSystem::FrameTrajectory(PartId part) const {
+  part = OrMain(part);
   Trajectory trajectory;
   trajectory.reserve(tracked_.size());
   const auto map = map_.Read();
   for (const TrackedFrame& frame : tracked_) {
+    if (map->PartOf(frame.reference) != part) continue;
     trajectory.push_back(
         {frame.timestamp_s, map->PoseFromReference(frame.reference, frame.cam_from_reference).Inverse()});
   }
@@ -178,13 +200,18 @@ Trajectory SlamSystem::FrameTrajectory() const {
 }
 
 size_t SlamSystem::LiveFrameCount() const {
-  return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(),
-                                           [](const TrackedFrame& frame) { return frame.is_live; }));
+  const PartId part = OrMain({});
+  const auto map = map_.Read();
+  return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(), [&](const TrackedFrame& frame) {
+    return frame.is_live && map->PartOf(frame.reference) == part;
+  }));
 }
 
-Trajectory SlamSystem::KeyframeTrajectory() const {
+Trajectory SlamSystem::KeyframeTrajectory(PartId part) const {
+  part = OrMain(part);
   Trajectory trajectory;
-  map_.Read()->keyframes().ForEach([&trajectory](const Keyframe& keyframe) {
+  map_.Read()->keyframes().ForEach([&](const Keyframe& keyframe) {
+    if (keyframe.part() != part) return;
     trajectory.push_back({keyframe.timestamp_s(), keyframe.cam_from_world().Inverse()});
   });
   return trajectory;

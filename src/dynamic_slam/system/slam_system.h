@@ -51,6 +51,7 @@ struct LoopReport {
   std::vector<LoopAttempt> attempts;  // of all keyframes, in their order; a reason says why one was refused
   int linked = 0;                     // places known again where nothing had to be moved
   int corrected = 0;                  // loops after which the map was moved
+  int joined = 0;                     // of these, those that made one of two parts of the map
   int landmarks_merged = 0;
   int bundles = 0, bundles_stopped = 0;  // adjustments of the whole map after that
 };
@@ -89,9 +90,13 @@ class SlamSystem {
   // Forgets all images and the map.
   void Reset();
 
-  // The frames that have a pose, at where the map puts them now.
-  Trajectory FrameTrajectory() const;
-  Trajectory KeyframeTrajectory() const;
+  // Parts of the map, each with a world and a unit of length of its own: the one with the most frames first.
+  // More than one where tracking was lost, started anew, and saw nothing since that it knew before.
+  std::vector<PartId> Parts() const;
+
+  // The frames that have a pose in the part, the main one unless it is said, at where the map puts them now.
+  Trajectory FrameTrajectory(PartId part = {}) const;
+  Trajectory KeyframeTrajectory(PartId part = {}) const;
 
   // Frames of FrameTrajectory that had their pose when their turn came.
   size_t LiveFrameCount() const;
@@ -124,6 +129,7 @@ class SlamSystem {
     uint32_t epoch;  // of the map
   };
 
+  PartId OrMain(PartId part) const;
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   // Looks for loops at the keyframes that local mapping has done since the last call.
   void PostLoops();

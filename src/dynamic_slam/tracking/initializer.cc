@@ -200,8 +200,9 @@ std::vector<EarlierFrame> Initializer::BuildMap(const InitialProposal& proposal,
   frame->cam_from_world = structure.last_from_reference;
   frame->cam_from_world.translation *= scale;
   frame->ClearLandmarks();
-  const KeyframeId first_id = InsertKeyframe(*reference_, map);
-  const KeyframeId second_id = InsertKeyframe(*frame, map);
+  const PartId part = map->BeginPart();
+  const KeyframeId first_id = InsertKeyframe(*reference_, map, part);
+  const KeyframeId second_id = InsertKeyframe(*frame, map, part);
   for (size_t i = 0; i < matches.size(); ++i) {
     if (structure.is_good[i] == 0) continue;
     const Eigen::Vector3d position = scale * structure.points_in_reference[i];

@@ -40,8 +40,8 @@ class Initializer {
   // Nothing while that is not possible: reason() says why.
   std::optional<InitialProposal> Propose(const Frame& frame, Random& random);
 
-  // Gives the map, which must be empty, two keyframes and their landmarks (median depth 1 in the first), and
-  // the frame, which is the one of the proposal, its pose, landmarks and reference.
+  // Gives the map a new part of two keyframes and their landmarks (median depth 1 in the first), and the
+  // frame, which is the one of the proposal, its pose, landmarks and reference.
   // The frames before it that have a pose now, in the order of time.
   std::vector<EarlierFrame> BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
 

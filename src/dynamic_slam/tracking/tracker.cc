@@ -90,40 +90,44 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
   TrackingResult result;
   result.dynamic = judged;
   result.keypoints = static_cast<int>(frame_.features.size());
-  if (state_ == TrackingState::kInitialising) {
+  if ((last_has_pose_ && TrackFrame()) || Relocalise()) {
+    AcceptPose();
+    if (!start_is_certain_) ReviewStart(&result);
+    if (state_ == TrackingState::kTracking && !result.part_was_erased) {
+      InsertKeyframeIfDue(keyframes_waiting, &result);
+    }
+  } else if (state_ == TrackingState::kInitialising) {
     Initialise(&result);
   } else {
-    const bool tracked = (last_has_pose_ && TrackFrame()) || Relocalise();
-    state_ = tracked ? TrackingState::kTracking : TrackingState::kLost;
-    if (tracked) {
-      lost_frames_ = 0;
-      ++tracked_frames_;
-      CountVisibility();
-      frame_.reference = view_.reference;
-      frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
-      frame_.cam_from_reference.translation /= view_.reference_unit;
-      frame_.reference_unit = view_.reference_unit;
-      velocity_.reset();
-      if (last_has_pose_) {
-        velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
-        velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
-        if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
-      }
-      if (!start_is_certain_) ReviewStart(&result);
-      if (state_ == TrackingState::kTracking && !result.map_was_reset) {
-        InsertKeyframeIfDue(keyframes_waiting, &result);
-      }
-    } else {
-      velocity_.reset();
-      ++lost_frames_;
-      GiveUpSmallMap(&result);
-    }
-    last_has_pose_ = state_ == TrackingState::kTracking;
+    state_ = TrackingState::kLost;
+    velocity_.reset();
+    ++lost_frames_;
+    StartAnewWhenLostForLong(&result);
   }
+  last_has_pose_ = state_ == TrackingState::kTracking;
   result.state = state_;
   result.inliers = inliers_;
   result.reason = reason_;
   return result;
+}
+
+void Tracker::AcceptPose() {
+  if (state_ == TrackingState::kInitialising) {  // a known place was found first
+    initializer_.Reset();
+    start_is_certain_ = true;
+  }
+  state_ = TrackingState::kTracking;
+  lost_frames_ = 0;
+  CountVisibility();
+  frame_.reference = view_.reference;
+  frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
+  frame_.cam_from_reference.translation /= view_.reference_unit;
+  frame_.reference_unit = view_.reference_unit;
+  velocity_.reset();
+  if (!last_has_pose_) return;
+  velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
+  velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
+  if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
 }
 
 void Tracker::Initialise(TrackingResult* result) {
@@ -137,16 +141,18 @@ void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) 
     auto map = map_->Write();
     result->earlier_frames = initializer_.BuildMap(proposal, &frame_, map.get());
     result->map_epoch = map->epoch();
+    const PartId part = start_part_ = map->keyframes().At(frame_.reference).part();
     result->new_keyframes.clear();
-    map->keyframes().ForEach(
-        [result](const Keyframe& keyframe) { result->new_keyframes.push_back(keyframe.id()); });
+    map->keyframes().ForEach([&](const Keyframe& keyframe) {
+      if (keyframe.part() == part) result->new_keyframes.push_back(keyframe.id());
+    });
     inliers_ = map->keyframes().At(frame_.reference).LandmarkCount();
   }
   start_is_certain_ = proposal.is_certain;
   if (start_is_certain_) initializer_.Reset();
   state_ = TrackingState::kTracking;
   start_frame_ = frame_.id;
-  last_has_pose_ = true;
+  lost_frames_ = 0;
   velocity_.reset();
   last_keyframe_ = frame_.reference;
   last_keyframe_frame_ = frame_.id;
@@ -155,19 +161,21 @@ void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) 
 }
 
 void Tracker::ReviewStart(TrackingResult* result) {
-  if (frame_.id.value() - start_frame_.value() < kMaxReviews) {
+  // Who was found in another part of the map, or whose part was recognised in another one, is certain.
+  const bool is_in_start = PartOfFrame() == start_part_;
+  if (is_in_start && frame_.id.value() - start_frame_.value() < kMaxReviews) {
     const FrameId reference = initializer_.reference();
     const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
     if (initializer_.reference() != reference) {
       // The first view is out of sight, and nobody knows which motion it was.
-      EmptyMap(result);
+      ErasePart(result);
       reason_ = initializer_.reason();
       return;
     }
     if (!proposal.has_value() || !proposal->is_certain) return;
-    // The first keyframe, which nothing moves, is the reference.
+    // The reference is the origin of the part.
     if (!Agree(frame_.cam_from_world, proposal->structure.last_from_reference)) {
-      EmptyMap(result);
+      ErasePart(result);
       StartMap(*proposal, result);
       reason_ = "another motion fits better: " + initializer_.reason();
       return;
@@ -177,22 +185,29 @@ void Tracker::ReviewStart(TrackingResult* result) {
   initializer_.Reset();
 }
 
-void Tracker::EmptyMap(TrackingResult* result) {
-  map_->Write()->Reset();
+PartId Tracker::PartOfFrame() const { return map_->Read()->PartOf(frame_.reference); }
+
+void Tracker::ErasePart(TrackingResult* result) {
+  const PartId part = PartOfFrame();
+  map_->Write()->ErasePart(part);
+  ForgetPose();
+  result->part_was_erased = true;
+  result->new_keyframes.clear();
+}
+
+void Tracker::ForgetPose() {
   visibility_.Clear();
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
   last_has_pose_ = false;
-  result->map_was_reset = true;
-  result->new_keyframes.clear();
+  velocity_.reset();
   lost_frames_ = 0;
-  tracked_frames_ = 0;
   inliers_ = 0;
 }
 
 void Tracker::Reset() {
-  TrackingResult ignored;
-  EmptyMap(&ignored);
+  map_->Write()->Reset();
+  ForgetPose();
   initializer_.Reset();
   filter_.Reset();
   share_in_boxes_ = 0;
@@ -275,9 +290,10 @@ bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
 
 // Those that look like the frame, and the youngest, where the camera was a moment ago.
 std::vector<KeyframeId> Tracker::RelocalisationCandidates() const {
+  std::vector<KeyframeId> candidates, youngest;
+  if (map_->Read()->keyframes().size() == 0) return candidates;
   const std::vector<uint64_t> words =
       PlaceWords(frame_.features, frame_.static_probability, kMinStaticProbability);
-  std::vector<KeyframeId> candidates, youngest;
   {
     const auto map = map_->Read();
     for (const PlaceMatch& match : map->places().Query(words)) candidates.push_back(match.keyframe);
@@ -295,6 +311,7 @@ std::vector<KeyframeId> Tracker::RelocalisationCandidates() const {
 
 bool Tracker::Relocalise() {
   const std::vector<KeyframeId> candidates = RelocalisationCandidates();
+  if (candidates.empty()) return false;
   const std::string why_lost = reason_;
   for (const KeyframeId candidate : candidates) {
     int inliers = 0;
@@ -383,7 +400,7 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
         map->keyframes().At(anchor.keyframe).cam_from_world() != view_.reference_from_world) {
       frame_.cam_from_world = map->PoseFromReference(frame_.reference, frame_.cam_from_reference);
     }
-    last_keyframe_ = InsertKeyframe(frame_, map.get());
+    last_keyframe_ = InsertKeyframe(frame_, map.get(), map->keyframes().At(anchor.keyframe).part());
     result->map_epoch = map->epoch();
   }
   last_keyframe_frame_ = frame_.id;
@@ -394,16 +411,21 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
   result->new_keyframes.push_back(last_keyframe_);
 }
 
-// A map that lost the camera so soon was probably wrong from the start.
-void Tracker::GiveUpSmallMap(TrackingResult* result) {
-  if (lost_frames_ < options_.reset_after_frames) return;
-  const size_t keyframes = map_->Read()->keyframes().size();
-  const bool is_small = static_cast<int>(keyframes) <= options_.reset_keyframes;
-  const bool is_young = lost_frames_ > tracked_frames_ && tracked_frames_ < options_.young_map_frames;
-  if (!is_small && !is_young) return;
-  reason_ =
-      fmt::format("starting again: lost for {} frames with a map of {} keyframes", lost_frames_, keyframes);
-  EmptyMap(result);
+// A map that lost the camera so soon was probably wrong from the start; another one is kept, and becomes one
+// with the new one when a place in it is known again.
+void Tracker::StartAnewWhenLostForLong(TrackingResult* result) {
+  if (lost_frames_ < options_.restart_after_frames) return;
+  const PartId part = PartOfFrame();
+  int keyframes = 0;
+  map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) { keyframes += keyframe.part() == part; });
+  const bool is_small = keyframes <= options_.small_map_keyframes;
+  reason_ = fmt::format("starting again: lost for {} frames; the map of {} keyframes is {}", lost_frames_,
+                        keyframes, is_small ? "given up" : "kept");
+  if (is_small) {
+    ErasePart(result);
+  } else {
+    ForgetPose();
+  }
   initializer_.Reset();
 }
 

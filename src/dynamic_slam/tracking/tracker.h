@@ -23,7 +23,7 @@
 namespace dynamic_slam {
 
 enum class TrackingState {
-  kInitialising,  // there is no map yet
+  kInitialising,  // there is no map yet, or the camera was lost for long: a start is looked for
   kTracking,
   kLost,  // there is a map, and no pose in it
 };
@@ -41,7 +41,7 @@ struct TrackingResult {
   std::vector<KeyframeId> new_keyframes;     // inserted into the map, waiting for local mapping
   uint32_t map_epoch = 0;                    // of the map that they belong to
   std::vector<EarlierFrame> earlier_frames;  // that have a pose since the map was made
-  bool map_was_reset = false;
+  bool part_was_erased = false;  // of the map, with the poses of the frames in it
 };
 
 // Which landmarks were to be seen in frames, and which were found; the map is told with the next keyframe.
@@ -92,11 +92,15 @@ class Tracker {
   const Frame& frame() const { return frame_; }
 
  private:
+  void AcceptPose();
   void Initialise(TrackingResult* result);
   void StartMap(const InitialProposal& proposal, TrackingResult* result);
   // While the start is not certain: whether the map is still believed.
   void ReviewStart(TrackingResult* result);
-  void EmptyMap(TrackingResult* result);
+  // Erases the part of the map in which the camera is, or was last.
+  void ErasePart(TrackingResult* result);
+  void ForgetPose();
+  PartId PartOfFrame() const;
   bool TrackFrame();
   bool TrackFromLastFrame();
   bool Relocalise();
@@ -107,7 +111,7 @@ class Tracker {
   double MedianDepthOfFrame() const;
   void CountVisibility();
   void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
-  void GiveUpSmallMap(TrackingResult* result);
+  void StartAnewWhenLostForLong(TrackingResult* result);
 
   Camera camera_;
   OrbOptions orb_options_;
@@ -129,13 +133,13 @@ class Tracker {
   Frame frame_, last_;
   bool last_has_pose_ = false;
   bool start_is_certain_ = true;
+  PartId start_part_;  // of the map, that the last start made
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
   double velocity_dt_s_ = 0;        // the time between these two
   KeyframeId last_keyframe_;
   FrameId last_keyframe_frame_;
   FrameId start_frame_;
   int lost_frames_ = 0;
-  int tracked_frames_ = 0;  // in this map
   int inliers_ = 0;
   int most_inliers_ = 0;  // since the last keyframe
   std::string reason_;

@@ -73,9 +73,8 @@ struct TrackerOptions {
   int min_relocalisation_inliers = 50;
   int local_keyframes = 60;
   int relocalisation_keyframes = 20;
-  int reset_keyframes = 5;
-  int reset_after_frames = 15;
-  int young_map_frames = 60;
+  int restart_after_frames = 15;
+  int small_map_keyframes = 5;
   InitializerOptions initializer;
   KeyframePolicyOptions keyframe;
   PoseOptimizerOptions pose;
@@ -100,16 +99,12 @@ struct TrackerOptions {
           OptionField{"", 1, 1000,
                       "Keyframes tried on each frame while lost: three quarters look like it, the others are "
                       "the youngest."});
-    visit(
-        "reset_keyframes", self.reset_keyframes,
-        OptionField{"", 0, 1000, "A map of at most so many keyframes is given up when the camera is lost."});
-    visit("reset_after_frames", self.reset_after_frames,
-          OptionField{"", 1, 10000, "Lost frames after which such a small map is given up."});
-    visit(
-        "young_map_frames", self.young_map_frames,
-        OptionField{"", 0, 100000,
-                    "A map of less tracked frames is given up when the camera has been lost for longer than "
-                    "that."});
+    visit("restart_after_frames", self.restart_after_frames,
+          OptionField{"", 1, 10000,
+                      "After so many lost frames a new start is looked for, beside places that are known."});
+    visit("small_map_keyframes", self.small_map_keyframes,
+          OptionField{"", 0, 1000,
+                      "A map of at most so many keyframes is given up then; a larger one is kept."});
     visit("initializer", self.initializer);
     visit("keyframe", self.keyframe);
     visit("pose", self.pose);
