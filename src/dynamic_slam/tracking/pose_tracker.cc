@@ -1,6 +1,7 @@
 #include "dynamic_slam/tracking/pose_tracker.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "dynamic_slam/map/static_evidence.h"
 
@@ -14,6 +15,10 @@ constexpr double kKeyframeRatio = 0.85;
 // Where somebody may stand before the landmark, any corner may be found in its place.
 int MaxDistance(const Frame& frame, uint32_t keypoint) {
   return frame.StaticProbability(keypoint) < kMinStaticProbability ? kStrictDistance : kLooseDistance;
+}
+
+double TrustIn(const Frame& frame, size_t keypoint) {
+  return TrustInMatch(frame.StaticProbability(keypoint), frame.static_log_odds[keypoint]);
 }
 
 }  // namespace
@@ -62,7 +67,7 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
     if (keyframe.landmarks()[i].IsValid()) with_landmark.push_back(i);
   }
   for (uint32_t i = 0; i < frame->features.size(); ++i) {
-    if (frame->StaticProbability(i) > 0) usable.push_back(i);
+    if (frame->StaticProbability(i) >= kMinStaticProbability) usable.push_back(i);
   }
   const std::vector<Match> matches = MatchMutual(keyframe.features(), with_landmark, frame->features, usable,
                                                  (kStrictDistance + kLooseDistance) / 2, kKeyframeRatio);
@@ -146,19 +151,23 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     const Keypoint& keypoint = frame->features.keypoints[i];
     observations_.Add(frame->points[i], {keypoint.x, keypoint.y},
                       1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)],
-                      TrustInMatch(frame->StaticProbability(i), frame->static_log_odds[i]));
+                      TrustIn(*frame, i));
     observed_keypoints_.push_back(i);
   }
   rejected_.clear();
   optimizer_.Optimize(observations_, initial_cam_from_world, &estimate_);
   if (!estimate_.converged) return 0;
   frame->cam_from_world = estimate_.cam_from_world;
+  double trusted = 0;
   for (size_t i = 0; i < observed_keypoints_.size(); ++i) {
-    if (estimate_.is_inlier[i] != 0) continue;
+    if (estimate_.is_inlier[i] != 0) {
+      trusted += TrustIn(*frame, observed_keypoints_[i]);
+      continue;
+    }
     rejected_.push_back(frame->landmarks[observed_keypoints_[i]]);
     frame->landmarks[observed_keypoints_[i]] = LandmarkId();
   }
-  return estimate_.inliers;
+  return static_cast<int>(std::lround(trusted));
 }
 
 void PoseTracker::TakeUnusable(const Frame& frame) {

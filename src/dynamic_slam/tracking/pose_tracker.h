@@ -16,7 +16,8 @@
 namespace dynamic_slam {
 
 // Finds a frame's pose from landmarks: matching, then Eq. (10). Each Track* leaves the pose and the landmarks
-// that fit it in the frame and returns their number.
+// that fit it in the frame and returns how many they are, each counting as much as it can be trusted to be at
+// rest (TrustInMatch).
 class PoseTracker {
  public:
   PoseTracker(const Camera& camera, const TrackerOptions& options, std::vector<float> octave_scales);
