@@ -29,8 +29,8 @@ enum class Event { kNone, kReset, kLoss, kStop };
 SystemOptions RunOptions() {
   SystemOptions options = SmallRoom::CheapOptions();
   // Every loss ends the map, also of a map that mapping is busy with.
-  options.tracker.reset_keyframes = 1000;
-  options.tracker.reset_after_frames = 2;
+  options.tracker.small_map_keyframes = 1000;
+  options.tracker.restart_after_frames = 2;
   return options;
 }
 

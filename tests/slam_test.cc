@@ -22,9 +22,10 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-Room MakeRoom(int frames) {
+Room MakeRoom(int frames, uint64_t seed = 1) {
   RoomOptions options;
   options.frames = frames;
+  options.seed = seed;
   return Room(options);
 }
 
@@ -154,6 +155,29 @@ TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
   EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
             0.005 * PathLength(ToPoseList(room.truth())));
   EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
+}
+
+TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
+  const Room room = MakeRoom(150), other = MakeRoom(60, 2);
+  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), Frames(other, 0, 50)), Frames(room, 80, 150)));
+  const RunSummary& summary = run.summary;
+  EXPECT_EQ(summary.reset_count, 0);
+  const auto restart = std::find_if(summary.frames.begin(), summary.frames.end(), [](const auto& frame) {
+    return frame.reason.find("is kept") != std::string::npos;
+  });
+  ASSERT_NE(restart, summary.frames.end());
+  EXPECT_EQ(summary.frames[125].state, TrackingState::kTracking) << "in the other room";
+  EXPECT_EQ(summary.frames.back().state, TrackingState::kTracking) << "in the first room again";
+  const std::vector<PartId> parts = run.system->Parts();
+  ASSERT_EQ(parts.size(), 2u) << "no false join";
+  EXPECT_EQ(summary.maps, 2u);
+  EXPECT_GE(run.system->FrameTrajectory().size(), 130u);
+  EXPECT_GE(run.system->FrameTrajectory(parts[1]).size(), 10u);
+  EXPECT_LE(summary.frames_tracked, run.system->FrameTrajectory().size()) << "of the main map";
+  EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
+  WriteResults(folder_, *run.system, summary);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "trajectory_2.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "trajectory_3.txt"));
 }
 
 TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {

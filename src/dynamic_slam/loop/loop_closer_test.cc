@@ -18,13 +18,15 @@ constexpr int kPasses = 6;  // keyframes each time that the camera comes by
 // The camera comes by twice and makes landmarks of its own each time, as if it did not know that it was here
 // before.
 struct TwoVisits {
-  // The second visit begins at `x`, and is seen through the drift.
-  explicit TwoVisits(const Sim3& drift, double second_x = 0.05) : world(1500), map(&world) {
+  // The second visit begins at `x`, and is seen through the drift; in a part of the map of its own, or not.
+  explicit TwoVisits(const Sim3& drift, double second_x = 0.05, bool starts_anew = false)
+      : world(1500), map(&world) {
     for (int visit = 0; visit < 2; ++visit) {
+      const PartId part = visit == 0 || starts_anew ? map.map.BeginPart() : PartId(0);
       for (int i = 0; i < kPasses; ++i) {
         const double x = 0.1 * i + (visit == 0 ? first_x : first_x + second_x);
         truth.push_back(SidewaysPose(x));
-        ids[visit].push_back(map.Add(truth.back()));
+        ids[visit].push_back(map.Add(truth.back(), part));
       }
       map.AddLandmarks(0, static_cast<uint32_t>(world.size()), ids[visit]);
     }
@@ -37,7 +39,7 @@ struct TwoVisits {
     }
   }
 
-  LoopResult Close(LoopOptions options = {}, const std::function<bool()>& should_stop = {}) {
+  LoopResult Close(const LoopOptions& options = {}, const std::function<bool()>& should_stop = {}) {
     LoopCloser closer(world.camera(), options, 1, &map.shared_map);
     return closer.Process(ids[1].back(), map.map.epoch(), should_stop);
   }
@@ -49,6 +51,14 @@ struct TwoVisits {
       worst = std::max(worst, (keyframe.CenterInWorld() - truth[i].TargetOriginInSource()).norm());
     }
     return worst;
+  }
+
+  // From its first keyframe to the others, in lengths of the map.
+  std::vector<double> DistancesOfSecondVisit() const {
+    const auto center = [&](int i) { return map.map.keyframes().At(ids[1][i]).CenterInWorld(); };
+    std::vector<double> distances;
+    for (int i = 1; i < kPasses; ++i) distances.push_back((center(i) - center(0)).norm());
+    return distances;
   }
 
   double first_x = 0;
@@ -71,6 +81,32 @@ TEST(LoopCloserTest, FindsThePlaceAndTakesTheDriftAway) {
   EXPECT_LT(visits.map.map.landmarks().size(), landmarks - 100);
   EXPECT_THAT(visits.map.map.Validate(), IsEmpty());
   EXPECT_FALSE(visits.map.map.keyframes().At(visits.ids[1].back()).covisible().empty());
+}
+
+TEST(LoopCloserTest, APlaceInAnotherPartOfTheMapJoinsThem) {
+  TwoVisits visits(kDrift, 0.05, true);
+  ASSERT_EQ(visits.map.map.Parts().size(), 2u);
+  const std::vector<double> before = visits.DistancesOfSecondVisit();
+  const LoopResult result = visits.Close();
+  ASSERT_TRUE(result.joined);
+  EXPECT_EQ(visits.map.map.Parts(), std::vector{PartId(0)});
+  EXPECT_EQ(visits.map.map.PartOf(visits.ids[1].front()), PartId(0));
+  EXPECT_LT(visits.WorstCenter(), 0.02);
+  // Moved and scaled as a whole.
+  const std::vector<double> after = visits.DistancesOfSecondVisit();
+  for (size_t i = 0; i < before.size(); ++i) EXPECT_NEAR(after[i] / before[i], after[0] / before[0], 1e-9);
+  EXPECT_NEAR(visits.map.map.UnitOf(visits.ids[1].back()), 1 / kDrift.scale, 0.02);
+  EXPECT_THAT(visits.map.map.Validate(), IsEmpty());
+}
+
+TEST(LoopCloserTest, OtherPartsOfTheMapStayWhereTheyAre) {
+  TwoVisits visits(kDrift);
+  const PartId other = visits.map.map.BeginPart();
+  const KeyframeId elsewhere = visits.map.Add(SidewaysPose(30), other);
+  const Rigid3 before = visits.map.map.keyframes().At(elsewhere).cam_from_world();
+  ASSERT_TRUE(visits.Close().corrected);
+  EXPECT_EQ(visits.map.map.keyframes().At(elsewhere).cam_from_world(), before);
+  EXPECT_EQ(visits.map.map.Parts().size(), 2u);
 }
 
 TEST(LoopCloserTest, FramesFollowTheirKeyframesAndTheirScale) {

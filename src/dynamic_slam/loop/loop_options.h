@@ -19,7 +19,7 @@ struct LoopOptions {
   int min_edge_weight = 20;
   int pose_graph_iterations = 30;
   bool full_bundle = true;
-  Sim3Options sim3;
+  Sim3Options sim3 = {};
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {

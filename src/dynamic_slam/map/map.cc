@@ -166,8 +166,15 @@ void Map::EraseKeyframe(KeyframeId id, KeyframeId heir) {
   }
   if (heirs_.size() <= id.value()) heirs_.resize(id.value() + 1);
   heirs_[id.value()] = {heir, OwnFromWorld(keyframes_.At(id)) * OwnFromWorld(keyframes_.At(heir)).Inverse()};
+  const PartId part = keyframes_.At(id).part();
+  const bool is_origin = IsOrigin(id);
   keyframes_.Erase(id);
   places_.Erase(id);
+  if (!is_origin) return;
+  KeyframeId& origin = origins_[part.value()] = KeyframeId();
+  keyframes_.ForEach([&](const Keyframe& keyframe) {
+    if (keyframe.part() == part && !origin.IsValid()) origin = keyframe.id();
+  });
 }
 
 void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {

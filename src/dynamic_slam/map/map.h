@@ -44,7 +44,7 @@ class Map {
   // Parts with keyframes, oldest first.
   std::vector<PartId> Parts() const;
 
-  // Whether the keyframe is the first of its part: nothing moves it but MergePart.
+  // Whether the keyframe is the oldest of its part: nothing moves it but MergePart.
   bool IsOrigin(KeyframeId id) const;
 
   // Frames that hang on keyframes of the part have no pose any more.

@@ -230,5 +230,41 @@ TEST(FrameTest, AMergedLandmarkIsLinkedOnce) {
   EXPECT_THAT(map.Validate(), IsEmpty());
 }
 
+TEST(MapTest, PartsHaveAnOriginEachAndCanBeErased) {
+  Map map = MakeMap();
+  const PartId first = map.BeginPart();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10);
+  const PartId second = map.BeginPart();
+  ASSERT_NE(first, second);
+  const auto add = [&](double x) {
+    return map
+        .AddKeyframe(FrameId(9), 9, Rigid3(Eigen::Quaterniond::Identity(), {x, 0, 0}), MakeFeatures(10, 9),
+                     KeypointGrid(), {}, second)
+        .id();
+  };
+  const KeyframeId c = add(0), d = add(1);
+  for (const auto& [one, other] : {std::pair{a, b}, std::pair{c, d}}) {
+    const LandmarkId id = map.AddLandmark({0, 0, 1}, one).id();
+    map.Link(one, 0, id);
+    map.Link(other, 0, id);
+  }
+  EXPECT_TRUE(map.IsOrigin(a) && map.IsOrigin(c));
+  EXPECT_FALSE(map.IsOrigin(b) || map.IsOrigin(d));
+  EXPECT_EQ(map.Parts(), (std::vector{first, second}));
+  EXPECT_THAT(map.Validate(), IsEmpty());
+
+  const uint32_t epoch = map.epoch();
+  map.EraseKeyframe(d, c);
+  map.ErasePart(second);
+  EXPECT_NE(map.epoch(), epoch);
+  EXPECT_EQ(map.Parts(), std::vector{first});
+  EXPECT_EQ(map.landmarks().size(), 1u);
+  EXPECT_EQ(map.PartOf(a), first);
+  EXPECT_FALSE(map.PartOf(c).IsValid());
+  EXPECT_FALSE(map.PartOf(d).IsValid()) << "nor what hangs on keyframes that were culled before";
+  EXPECT_THAT(map.Validate(), IsEmpty());
+  EXPECT_EQ(map.BeginPart(), PartId(2)) << "ids are never reused";
+}
+
 }  // namespace
 }  // namespace dynamic_slam

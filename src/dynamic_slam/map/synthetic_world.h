@@ -90,9 +90,9 @@ class SyntheticMap {
       : shared_map(SyntheticWorld::OctaveScales()), map(*shared_map.Write()), world_(world) {}
 
   // A keyframe at the pose that sees no landmark yet.
-  KeyframeId Add(const Rigid3& cam_from_world) {
+  KeyframeId Add(const Rigid3& cam_from_world, PartId part = PartId(0)) {
     views.push_back(world_->See(cam_from_world));
-    return InsertKeyframe(views.back().frame, &map);
+    return InsertKeyframe(views.back().frame, &map, part);
   }
 
   // A landmark at the point's true position, linked to those of the keyframes in which the point shows. Not
