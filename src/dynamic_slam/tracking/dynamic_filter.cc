@@ -27,9 +27,8 @@ constexpr double kApart = 3;
 // Spread of the motions of an object's parts, over its own motion.
 constexpr double kLimbs = 0.4;
 
-// Density of wrong matches, which lie anywhere in the window of the search, over their share of a tenth;
-// 1/px^2.
-constexpr double kMismatch = 0.1 / (std::numbers::pi * KeypointFlow::kRadiusPx * KeypointFlow::kRadiusPx);
+// Share of wrong matches, which lie anywhere in the window of the search.
+constexpr double kMismatchShare = 0.1;
 
 // What one frame can tell at most, as errors of matches have longer tails than any model.
 constexpr double kMostEvidence = 2;
@@ -238,6 +237,7 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
   const std::vector<Mover> movers = FindMovers(flow);
   if (movers.empty()) return;
   const Rigid3 frame_from_last = frame->cam_from_world * last.cam_from_world.Inverse();
+  const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
   const double nearest_depth = kNearestDepthRatio * median_depth;
   for (const Mover& mover : movers) WatchObject(mover, frame_from_last, nearest_depth);
   const Eigen::Matrix3d rotation = frame_from_last.Matrix();
@@ -276,7 +276,7 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
       const double log_moves = -0.5 * Square((px - moved_px).norm() / mover_sigma_px) -
                                std::log(2 * std::numbers::pi * mover_sigma_px * mover_sigma_px);
       const double ratio =
-          std::log(std::exp(log_rest) + kMismatch) - std::log(std::exp(log_moves) + kMismatch);
+          std::log(std::exp(log_rest) + mismatch) - std::log(std::exp(log_moves) + mismatch);
       evidence = std::abs(ratio) > std::abs(evidence) ? ratio : evidence;
     }
     float& odds = frame->motion_log_odds[i];

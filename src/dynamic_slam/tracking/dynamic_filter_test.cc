@@ -25,6 +25,7 @@ class DynamicFilterTest : public ::testing::Test {
         Add(x, y, x + (on_person ? kPersonPx : wall_px), y, on_person);
       }
     }
+    frame_.timestamp_s = last_.timestamp_s + 1.0 / 30;
     last_.cam_from_world = Rigid3();
     frame_.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {-kShift, 0, 0});
     for (Frame* frame : {&last_, &frame_}) {

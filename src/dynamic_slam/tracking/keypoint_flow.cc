@@ -8,6 +8,10 @@
 namespace dynamic_slam {
 namespace {
 
+// In the time between two frames, s: with more there is too much that looks alike, with less they are told
+// apart by their noise.
+constexpr double kMinInterval_s = 1.0 / 60, kMaxInterval_s = 0.1;
+
 // Nearest over second nearest distance.
 constexpr double kRatio = 0.8;
 
@@ -23,6 +27,8 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
                          const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame) {
   Clear(frame);
   if (boxes.empty()) return;
+  const double interval_s = std::clamp(frame.timestamp_s - last.timestamp_s, kMinInterval_s, kMaxInterval_s);
+  radius_px_ = camera_.fx * kMaxRate_rad_s * interval_s;
   const Eigen::Matrix3d rotation =
       frame_from_last.value_or(Eigen::Quaterniond::Identity()).toRotationMatrix();
   for (uint32_t i = 0; i < last.features.size(); ++i) {
@@ -34,8 +40,8 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
     const Eigen::Vector3d ray = rotation * camera_.Unproject({from.x, from.y});
     if (ray.z() <= 0) continue;
     const Eigen::Vector2d px = camera_.Project(ray);
-    const SearchWindow window{static_cast<float>(px.x()), static_cast<float>(px.y()), kRadiusPx,
-                              from.octave - 1, from.octave + 1};
+    const SearchWindow window{static_cast<float>(px.x()), static_cast<float>(px.y()),
+                              static_cast<float>(radius_px_), from.octave - 1, from.octave + 1};
     const WindowMatch match =
         FindInWindow(frame.features, frame.grid, window, last.features.descriptors[i], {});
     if (!match.Found() || match.distance >= distances_[match.keypoint]) continue;

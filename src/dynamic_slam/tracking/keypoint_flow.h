@@ -23,9 +23,9 @@ class KeypointFlow {
   // (SelectiveOptions::ring_ratio).
   static constexpr double kReach = 0.25;
 
-  // What an object or the camera's translation adds to the rotation from one frame to the next; a person who
-  // walks past at 2 m, at 30 frames a second, moves by less.
-  static constexpr float kRadiusPx = 20;
+  // What an object or the camera's translation adds to the camera's rotation, at most: somebody who walks past
+  // at 2.3 m/s and a distance of 2 m.
+  static constexpr double kMaxRate_rad_s = 1.15;
 
   KeypointFlow(const Camera& camera, std::vector<float> octave_scales)
       : camera_(camera), octave_scales_(std::move(octave_scales)) {}
@@ -40,12 +40,16 @@ class KeypointFlow {
   // For each keypoint of the frame the one of the last frame, or kNone.
   const std::vector<uint32_t>& last_keypoints() const { return last_keypoints_; }
 
+  // How far keypoints were looked for.
+  double radius_px() const { return radius_px_; }
+
   // The same as motions, px of the raw image.
   const std::vector<PointMotion>& motions() const { return motions_; }
 
  private:
   Camera camera_;
   std::vector<float> octave_scales_;
+  double radius_px_ = 1;
   std::vector<uint32_t> last_keypoints_;
   std::vector<int> distances_;
   std::vector<PointMotion> motions_;
