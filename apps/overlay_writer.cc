@@ -11,6 +11,20 @@
 namespace dynamic_slam {
 namespace {
 
+// The mask (Eq. 11): dynamic boxes.
+void TintMask(const std::vector<DynamicBox>& objects, cv::Mat* picture) {
+  constexpr double kTint = 0.25;
+  for (const DynamicBox& object : objects) {
+    if (!object.is_dynamic) continue;
+    const Box& box = object.box;
+    const cv::Rect area = cv::Rect(cv::Point2d(box.x, box.y), cv::Point2d(box.x + box.width, box.y + box.height)) &
+                          cv::Rect({}, picture->size());
+    if (area.empty()) continue;
+    cv::Mat part = (*picture)(area);
+    part = (1 - kTint) * part + kTint * cv::Scalar(60, 60, 230);
+  }
+}
+
 // Fig. 7, 11 and 13: what the pose rests on is drawn full, in a dynamic box yellow; what is not trusted is a
 // red dot, the rest a grey one.
 void DrawKeypoints(const Frame& frame, cv::Mat* picture) {
@@ -45,6 +59,7 @@ OverlayWriter::OverlayWriter(std::filesystem::path folder, const Camera& raw_cam
 
 void OverlayWriter::Write(const RunProgress& progress) {
   preparer_.PrepareColour(progress.image->image, &picture_);
+  TintMask(progress.result->objects.boxes, &picture_);
   for (const DynamicBox& object : progress.result->objects.boxes) {
     const std::string label =
         fmt::format("{} {:.2f}", class_names_[static_cast<size_t>(object.class_id)], object.score);

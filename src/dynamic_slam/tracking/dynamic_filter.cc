@@ -94,6 +94,23 @@ std::vector<Box> DynamicFilter::Boxes() const {
   return boxes;
 }
 
+bool DynamicFilter::OnlyBoxesMove(std::span<const PointMotion> motions) const {
+  // A corner is found to a pixel; what moves by less than twice that cannot be told from what does not.
+  constexpr double kStill_px = 1, kMoves_px = 2;
+  std::vector<double> inside_px, outside_px;
+  for (const PointMotion& motion : motions) {
+    const bool is_inside = std::any_of(objects_.begin(), objects_.end(), [&](const Object& object) {
+      return object.box.box.Contains(motion.to_px.x(), motion.to_px.y());
+    });
+    (is_inside ? inside_px : outside_px).push_back((motion.to_px - motion.from_px).norm());
+  }
+  if (inside_px.empty() || outside_px.empty() || Median(&outside_px) > kStill_px) return false;
+  // Somebody moves, though others stand, and the box shows what is behind them too.
+  const auto upper = inside_px.begin() + static_cast<std::ptrdiff_t>(inside_px.size() * 3 / 4);
+  std::nth_element(inside_px.begin(), upper, inside_px.end());
+  return *upper > kMoves_px;
+}
+
 float DynamicFilter::Combine(float prior, float motion_log_odds) const {
   return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
 }

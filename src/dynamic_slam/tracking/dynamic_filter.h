@@ -43,6 +43,9 @@ class DynamicFilter {
   // Whether a point of the frame (ideal px) is in the box of something that moves.
   bool IsHidden(const Eigen::Vector2d& ideal_px) const;
 
+  // Whether the camera stands still and something in the boxes of the last Judge moves.
+  bool OnlyBoxesMove(std::span<const PointMotion> motions) const;
+
   // What a frame adds to the log-odds of a landmark that was matched with a keypoint, and fits the pose or
   // not.
   float Evidence(float static_probability, bool fits) const;

@@ -162,6 +162,21 @@ TEST_F(DynamicFilterTest, WithoutParallaxACarTellsNothing) {
   EXPECT_GT(counts.InBoxes(), 20);
 }
 
+TEST_F(DynamicFilterTest, SaysWhenOnlyPeopleMove) {
+  DynamicFilter filter = Make("weights");
+  flow_.Clear(frame_);
+  filter.Judge(std::vector{Person(0)}, flow_, last_, &frame_);
+  const auto moved = [](double x, double shift_px) {
+    return PointMotion{{x, 200}, {x + shift_px, 200}};
+  };
+  std::vector<PointMotion> motions;
+  for (int i = 0; i < 10; ++i) motions.push_back(moved(220 + 10 * i, i < 5 ? 6 : 0));  // in the box
+  for (int i = 0; i < 10; ++i) motions.push_back(moved(400 + 10 * i, 0.3));
+  EXPECT_TRUE(filter.OnlyBoxesMove(motions));
+  for (PointMotion& motion : motions) motion.to_px.x() += 5;  // the camera turns
+  EXPECT_FALSE(filter.OnlyBoxesMove(motions));
+}
+
 TEST_F(DynamicFilterTest, WithoutDynamicObjectsEverythingIsTrusted) {
   DynamicFilter filter = Make("weights");
   DynamicBox chair = Person(0);

@@ -119,12 +119,13 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
     first_px.push_back(views_.reference[sighting.reference_keypoint].ideal_px);
     second_px.push_back(sighting.ideal_px);
   }
-  const TwoViewResult motion = EstimateTwoView(camera_, first_px, second_px, options_.two_view, random);
+  const TwoViewOptions limits = Limits(frame);
+  const TwoViewResult motion = EstimateTwoView(camera_, first_px, second_px, limits, random);
   if (!motion.Succeeded() && motion.failure != TwoViewFailure::kAmbiguous) {
     reason_ = "initialising: " + Explain(motion);
     return std::nullopt;
   }
-  std::optional<InitialProposal> proposal = ChooseStructure(motion);
+  std::optional<InitialProposal> proposal = ChooseStructure(motion, limits.min_points);
   if (!proposal.has_value()) return std::nullopt;
   reason_ = fmt::format("initialised{}: {} points, parallax {:.1f} deg, {} views",
                         proposal->is_certain ? "" : " for the time being", proposal->structure.points,
@@ -148,7 +149,18 @@ void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches)
   }
 }
 
-std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult& result) {
+TwoViewOptions Initializer::Limits(const Frame& frame) const {
+  TwoViewOptions limits = options_.two_view;
+  const bool has_movers = std::any_of(frame.static_probability.begin(), frame.static_probability.end(),
+                                      [](float p) { return p < kMinStaticProbability; });
+  if (has_movers) {
+    limits.min_parallax_deg = std::max(limits.min_parallax_deg, options_.movers_min_parallax_deg);
+    limits.min_points = std::max(limits.min_points, options_.movers_min_points);
+  }
+  return limits;
+}
+
+std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult& result, int min_points) {
   if (views_.between.empty()) {
     reason_ = "initialising: waiting for a third view, to be sure";
     return std::nullopt;
@@ -176,9 +188,9 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
     reason_ = "initialising: the first bundle adjustment failed; trying the next image";
     return std::nullopt;
   }
-  if (best.points < options_.two_view.min_points) {
+  if (best.points < min_points) {
     reason_ = fmt::format("initialising: {} points survive the first bundle adjustment < {}", best.points,
-                          options_.two_view.min_points);
+                          min_points);
     return std::nullopt;
   }
   return InitialProposal{std::move(best), {}, is_certain};

@@ -53,10 +53,12 @@ class Initializer {
 
  private:
   void StartFrom(const Frame& frame);
+  // What a start needs in view of what the frame shows.
+  TwoViewOptions Limits(const Frame& frame) const;
   void AddView(const Frame& frame, const std::vector<Match>& matches);
   // The structure that fits all views best; nothing, and the reason, when there is none or another fits as
   // well.
-  std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result);
+  std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result, int min_points);
   double ScaleOf(const Keypoint& keypoint) const {
     return octave_scales_[static_cast<size_t>(keypoint.octave)];
   }

@@ -133,7 +133,11 @@ void Tracker::AcceptPose() {
 void Tracker::Initialise(TrackingResult* result) {
   const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
   reason_ = initializer_.reason();
-  if (proposal.has_value()) StartMap(*proposal, result);
+  if (proposal.has_value()) {
+    StartMap(*proposal, result);
+  } else if (filter_.HasBoxes() && filter_.OnlyBoxesMove(flow_.motions())) {
+    reason_ += "; only what is in the boxes of dynamic objects moves";
+  }
 }
 
 void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) {

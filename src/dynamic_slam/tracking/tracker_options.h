@@ -14,6 +14,8 @@ struct InitializerOptions {
   double search_radius_px = 100;
   int max_octave = 3;
   double max_cost_ratio = 0.75;
+  double movers_min_parallax_deg = 1.75;
+  int movers_min_points = 100;
   TwoViewOptions two_view;
 
   template <class Self, class Visitor>
@@ -34,6 +36,12 @@ struct InitializerOptions {
     visit("max_cost_ratio", self.max_cost_ratio,
           OptionField{"", 0, 1,
                       "Of two motions that fit, the errors of the better over those of the other, at most."});
+    visit("movers_min_parallax_deg", self.movers_min_parallax_deg,
+          OptionField{"deg", 0, 20,
+                      "The parallax of two_view, where something moves in the image: what is left of what is "
+                      "at rest tells less of which motion it was."});
+    visit("movers_min_points", self.movers_min_points,
+          OptionField{"", 8, 5000, "The points of two_view there."});
     visit("two_view", self.two_view);
   }
 };
@@ -69,8 +77,8 @@ struct TrackerOptions {
   double motion_radius_px = 15;
   double local_map_radius_px = 4;
   int min_motion_inliers = 15;
-  int min_inliers = 40;
-  int min_relocalisation_inliers = 50;
+  int min_inliers = 50;
+  int min_relocalisation_inliers = 60;
   int local_keyframes = 60;
   int relocalisation_keyframes = 20;
   int restart_after_frames = 15;
