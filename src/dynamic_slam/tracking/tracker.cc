@@ -1,6 +1,7 @@
 #include "dynamic_slam/tracking/tracker.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "dynamic_slam/base/trace.h"
@@ -277,7 +278,12 @@ bool Tracker::TrackFromLastFrame() {
         fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
     return false;
   }
-  return TrackLocalMap(options_.local_map_radius_px, options_.min_inliers);
+  return TrackLocalMap(options_.local_map_radius_px, MinInliers());
+}
+
+int Tracker::MinInliers() const {
+  const double more = share_in_boxes_ * (options_.movers_min_inliers - options_.min_inliers);
+  return options_.min_inliers + static_cast<int>(std::lround(std::max(more, 0.0)));
 }
 
 bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
@@ -323,9 +329,10 @@ bool Tracker::Relocalise() {
       inliers = pose_tracker_.TrackFromKeyframe(*map, *keyframe, random_, &frame_);
     }
     if (inliers < options_.pnp.min_inliers) continue;
-    if (!TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, options_.min_inliers)) continue;
+    if (!TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, MinInliers())) continue;
     // Once more from the better pose, with the narrow window.
-    if (TrackLocalMap(options_.local_map_radius_px, options_.min_relocalisation_inliers)) {
+    const int min_inliers = std::max(options_.min_relocalisation_inliers, MinInliers());
+    if (TrackLocalMap(options_.local_map_radius_px, min_inliers)) {
       reason_ = fmt::format("found again by keyframe {}", candidate.value());
       return true;
     }

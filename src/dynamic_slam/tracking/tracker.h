@@ -105,6 +105,7 @@ class Tracker {
   bool TrackFromLastFrame();
   bool Relocalise();
   std::vector<KeyframeId> RelocalisationCandidates() const;
+  int MinInliers() const;
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
   std::optional<Rigid3> PredictMotion() const;
@@ -124,7 +125,7 @@ class Tracker {
   PoseTracker pose_tracker_;
   DynamicFilter filter_;
   KeypointFlow flow_;
-  double share_in_boxes_ = 0;  // of the last frame's keypoints, those in dynamic boxes
+  double share_in_boxes_ = 0;  // of the keypoints, those in the boxes of movers
   LocalViewBuilder view_builder_;
   uint64_t seed_;
   Random random_;

@@ -77,8 +77,9 @@ struct TrackerOptions {
   double motion_radius_px = 15;
   double local_map_radius_px = 4;
   int min_motion_inliers = 15;
-  int min_inliers = 50;
-  int min_relocalisation_inliers = 60;
+  int min_inliers = 35;
+  int movers_min_inliers = 55;
+  int min_relocalisation_inliers = 50;
   int local_keyframes = 60;
   int relocalisation_keyframes = 20;
   int restart_after_frames = 15;
@@ -99,6 +100,10 @@ struct TrackerOptions {
           OptionField{"", 4, 1000, "Inliers that a first guess of the pose needs."});
     visit("min_inliers", self.min_inliers,
           OptionField{"", 4, 1000, "Inliers with less than which the camera is lost."});
+    visit("movers_min_inliers", self.movers_min_inliers,
+          OptionField{"", 4, 1000,
+                      "The same in a view that is full of movers; in between as far as their boxes fill it, as "
+                      "what is left is narrow, and more is found by chance."});
     visit("min_relocalisation_inliers", self.min_relocalisation_inliers,
           OptionField{"", 4, 1000, "Inliers that it takes to be found again."});
     visit("local_keyframes", self.local_keyframes,
