@@ -100,9 +100,8 @@ void PrintOutcomes(const std::vector<Outcome>& outcomes) {
                                : outcome.common_rmse_m.has_value()
                                    ? fmt::format("{:.4f}", *outcome.common_rmse_m)
                                    : "-";
-    fmt::print("{:<28} {:<16} {:>9.3f} {:>9} {:>13} {:>12.1f}\n",
-               ShortName(outcome.source), outcome.variant, outcome.coverage, ape, common,
-               outcome.tracking_ms);
+    fmt::print("{:<28} {:<16} {:>9.3f} {:>9} {:>13} {:>12.1f}\n", ShortName(outcome.source), outcome.variant,
+               outcome.coverage, ape, common, outcome.tracking_ms);
   }
 }
 

@@ -45,9 +45,9 @@ struct Outcome {
 };
 
 const StampedPose* PoseAt(const Trajectory& truth, double timestamp_s) {
-  const auto after = std::lower_bound(
-      truth.begin(), truth.end(), timestamp_s - kMaxDifferenceS,
-      [](const StampedPose& pose, double time_s) { return pose.timestamp_s < time_s; });
+  const auto after =
+      std::lower_bound(truth.begin(), truth.end(), timestamp_s - kMaxDifferenceS,
+                       [](const StampedPose& pose, double time_s) { return pose.timestamp_s < time_s; });
   return after != truth.end() && after->timestamp_s <= timestamp_s + kMaxDifferenceS ? &*after : nullptr;
 }
 
@@ -130,8 +130,8 @@ Outcome RunVariant(const LoopsArguments& arguments, const std::string& source, b
                    RunConsole* console) {
   const BenchRun run =
       RunForBench(arguments, source, {closing ? "loop.enabled=true" : "loop.enabled=false"}, console);
-  Outcome outcome{source, closing ? "with" : "without", run.summary.Coverage(), {}, run.summary.loops,
-                  {},     0,                            {}};
+  Outcome outcome{source, closing ? "with" : "without", run.summary.Coverage(), {}, run.summary.loops, {}, 0,
+                  {}};
   const std::optional<Trajectory> truth = LoadGroundTruth(source);
   const Trajectory estimate = run.system->FrameTrajectory();
   if (!truth.has_value() || estimate.size() < 3) return outcome;

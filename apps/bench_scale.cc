@@ -1,5 +1,5 @@
-// What time and memory do in a long sequence: once a place is mapped, to go round it again should cost nothing
-// more.
+// What time and memory do in a long sequence: once a place is mapped, to go round it again should cost
+// nothing more.
 
 #include <algorithm>
 #include <fstream>
@@ -7,11 +7,10 @@
 #include <string>
 #include <vector>
 
-#include <time.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "bench_run.h"
 #include "cmd_bench.h"

@@ -36,8 +36,7 @@ cv::Mat DrawCurves(const CurvePlot& plot, int width_px, int height_px) {
       size(width_px - kLeftPx - kRightPx, height_px - kTopPx - kBottomPx), end = corner + size;
   const double x_max = Reach(plot, 0, plot.x_max), y_max = Reach(plot, 1, plot.y_max);
   const auto to_px = [&](const Eigen::Vector2d& point) {
-    return Eigen::Vector2d(corner.x() + size.x() * point.x() / x_max,
-                           end.y() - size.y() * point.y() / y_max);
+    return Eigen::Vector2d(corner.x() + size.x() * point.x() / x_max, end.y() - size.y() * point.y() / y_max);
   };
   const double x_step = GridStep(x_max), y_step = GridStep(y_max);
   constexpr double kRounding = 1 + 1e-9;

@@ -14,8 +14,8 @@ namespace {
 constexpr double kBehind = 1e30;
 constexpr int kSampleRefinements = 3, kFinalRefinements = 15;
 
-// Of the quotient of two depths of a point, as a logarithm: at the least parallax of a landmark, 1 deg, and with
-// a pixel of 1/500 of the focal length, either is known to some 0.11.
+// Of the quotient of two depths of a point, as a logarithm: at the least parallax of a landmark, 1 deg, and
+// with a pixel of 1/500 of the focal length, either is known to some 0.11.
 constexpr double kLogDepthSigma = 0.2;
 
 using Vector7d = Eigen::Matrix<double, 7, 1>;

@@ -273,8 +273,7 @@ std::vector<Sim3Sighting> LoopDetector::NeighboursSightings(const Map& map, cons
     const Sim3 cam_from_keyframe = FromKeyframe(neighbour, keyframe);
     const Rigid3 there = ToRigid3(cam_from_keyframe * keyframe_from_world);
     int visible = 0;
-    for (const Loop::Link& link :
-         FindLandmarks(map, neighbour, there, loop.landmarks, radius_px, &visible)) {
+    for (const Loop::Link& link : FindLandmarks(map, neighbour, there, loop.landmarks, radius_px, &visible)) {
       const Keypoint& keypoint = neighbour.keypoint(link.keypoint);
       sightings.push_back({ToRigid3(cam_from_keyframe),
                            candidate.cam_from_world() * map.landmarks().At(link.landmark).position(),

@@ -18,15 +18,15 @@ struct LoopAttempt {
   KeyframeId keyframe, candidate;
   double timestamp_s = 0;  // of the keyframe
   double candidate_timestamp_s = 0;
-  double score = 0;        // of PlaceIndex
-  int matches = 0;         // of landmarks, by their descriptors
-  int sim3_inliers = 0;    // of these
-  int visible = 0;         // landmarks of the old place that the keyframe should see
-  int inliers = 0;         // of these: show where the similarity puts them
-  int confirming = 0;      // neighbours of the keyframe that see them too
-  double scale = 1;        // length about the keyframe over the same length about the candidate
-  double drift_px = 0;     // from where the map has the old landmarks to where they are, median
-  std::string reason;      // why it was refused; empty when it was not
+  double score = 0;      // of PlaceIndex
+  int matches = 0;       // of landmarks, by their descriptors
+  int sim3_inliers = 0;  // of these
+  int visible = 0;       // landmarks of the old place that the keyframe should see
+  int inliers = 0;       // of these: show where the similarity puts them
+  int confirming = 0;    // neighbours of the keyframe that see them too
+  double scale = 1;      // length about the keyframe over the same length about the candidate
+  double drift_px = 0;   // from where the map has the old landmarks to where they are, median
+  std::string reason;    // why it was refused; empty when it was not
 };
 
 // A keyframe that sees what was seen before, though the map does not know it.
