@@ -24,7 +24,7 @@ class RunConsole {
 
   // Both, for RunSequence.
   RunControl Control() {
-    return {[this](const RunProgress& progress) { Show(progress); }, [this] { return ShouldStop(); }};
+    return {[this](const RunProgress& progress) { Show(progress); }, [this] { return ShouldStop(); }, {}};
   }
 
   // Ends the line.

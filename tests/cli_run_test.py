@@ -310,21 +310,6 @@ class CliRunTest(unittest.TestCase):
     def test_masks_that_do_not_fit_are_input_errors(self):
         self.assert_input_error([self.room, "--masks", os.path.join(self.folder, "nowhere")], "nowhere", "no folder")
 
-    def test_ablation_compares_over_common_frames(self):
-        out = os.path.join(self.folder, "ablation")
-        boxes = self.boxes_file(self.room, 30, True)
-        result = run_program("bench", "ablation", self.room, "--max-frames", "30", "--detector", "boxes:" + boxes,
-                             "--out", out, "--quiet")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        rows = json.loads(read(out, "ablation.json"))
-        self.assertEqual([row["variant"] for row in rows][:4], ["none", "hard boxes", "paper", "default"])
-        none = rows[0]
-        self.assertGreater(none["coverage"], 0.7)
-        self.assertFalse(none["failed"])
-        for row in rows:
-            self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.05 * row["path_m"])
-            self.assertEqual(row["common_ape_m"] is None, row["failed"])
-
     def test_demo(self):
         out = os.path.join(self.folder, "a")
         arguments = ["demo", "--frames", "40", "--seed", "2", "--out", out]

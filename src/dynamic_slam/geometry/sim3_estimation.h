@@ -20,6 +20,16 @@ struct Sim3Match {
   double first_sigma_px = 1, second_sigma_px = 1;
 };
 
+// A point that the second camera knows, as another camera beside the first one sees it. Its place beside the
+// first is in the first one's unit of length: so a few of them know the scale, which images from one place do
+// not.
+struct Sim3Sighting {
+  Rigid3 cam_from_first;
+  Eigen::Vector3d x_in_second;
+  Eigen::Vector2d px;  // ideal
+  double sigma_px = 1;
+};
+
 struct Sim3Options {
   int min_inliers = 10;
   double chi2 = 9.21;
@@ -49,12 +59,14 @@ struct Sim3Estimate {
 
 // The similarity between two cameras from matched points, wrong ones among them: three points in closed form
 // (Horn 1987, Umeyama 1991) in RANSAC, judged by the reprojection of each point into the other image, then
-// refined.
+// refined. Where the two cameras are at one place, no image depends on the scale: then the depths that both
+// know decide, each with an uncertainty of a fifth.
 Sim3Estimate EstimateSim3(const Camera& camera, std::span<const Sim3Match> matches,
                           const Sim3Options& options, Random& random);
 
-// Minimises the reprojection errors from a first guess, without those that do not fit.
+// Minimises the reprojection errors, also those of the sightings, and differences of depth from a first
+// guess, without what does not fit. Inliers are among the matches.
 Sim3Estimate RefineSim3(const Camera& camera, std::span<const Sim3Match> matches, const Sim3Options& options,
-                        const Sim3& first_from_second);
+                        const Sim3& first_from_second, std::span<const Sim3Sighting> sightings = {});
 
 }  // namespace dynamic_slam

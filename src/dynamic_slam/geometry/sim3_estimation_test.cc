@@ -86,6 +86,54 @@ TEST(Sim3EstimationTest, RefinementComesFromFarOff) {
   EXPECT_LT((estimate.first_from_second.translation - kFirstFromSecond.translation).norm(), 0.02);
 }
 
+// Both cameras are at one place, where no image depends on the scale, and know depths to a tenth.
+struct OnePlace {
+  explicit OnePlace(uint64_t seed) {
+    const Camera camera = TestCamera();
+    Random random(seed);
+    while (matches.size() < 100) {
+      Sim3Match match;
+      const Eigen::Vector2d px = RandomPixel(camera, random);
+      const Eigen::Vector3d x_in_first = random.Uniform(2, 6) * camera.Unproject(px);
+      const Eigen::Vector3d x_in_second = truth.Inverse() * x_in_first;
+      if (!IsSeen(camera, x_in_second)) continue;
+      match.first_px = px + Noise(kNoisePx, random);
+      match.second_px = camera.Project(x_in_second) + Noise(kNoisePx, random);
+      match.x_in_first = (1 + 0.1 * random.Gaussian()) * x_in_first;
+      match.x_in_second = (1 + 0.1 * random.Gaussian()) * x_in_second;
+      matches.push_back(match);
+      const Eigen::Vector2d aside_px = camera.Project(aside_from_first * x_in_first);
+      sightings.push_back({aside_from_first, x_in_second, aside_px + Noise(kNoisePx, random)});
+    }
+  }
+
+  Sim3 truth{0.7, ExpSo3({0.1, -0.3, 0.05}), {0, 0, 0}};
+  Rigid3 aside_from_first{Eigen::Quaterniond::Identity(), {0.8, 0, 0}};
+  std::vector<Sim3Match> matches;
+  std::vector<Sim3Sighting> sightings;
+};
+
+TEST(Sim3EstimationTest, FromOnePlaceTheDepthsKnowTheScale) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    const OnePlace place(seed);
+    Random random(seed);
+    const Sim3Estimate estimate = EstimateSim3(TestCamera(), place.matches, {}, random);
+    ASSERT_TRUE(estimate.success);
+    EXPECT_NEAR(estimate.first_from_second.scale, place.truth.scale, 0.05 * place.truth.scale);
+  }
+}
+
+TEST(Sim3EstimationTest, FromOnePlaceACameraAsideKnowsTheScaleBetter) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    const OnePlace place(seed);
+    Sim3 guess = place.truth;
+    guess.scale *= 1.02;
+    const Sim3Estimate estimate = RefineSim3(TestCamera(), place.matches, {}, guess, place.sightings);
+    ASSERT_TRUE(estimate.success);
+    EXPECT_NEAR(estimate.first_from_second.scale, place.truth.scale, 0.005 * place.truth.scale);
+  }
+}
+
 TEST(Sim3EstimationTest, TheSameSeedGivesTheSameBits) {
   const auto matches = MakeSim3Matches(100, 60, 5);
   Random first(2), second(2);

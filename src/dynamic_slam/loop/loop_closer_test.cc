@@ -13,15 +13,19 @@ using testing::Field;
 using testing::IsEmpty;
 using testing::Not;
 
+constexpr int kPoints = 1500;
 constexpr int kPasses = 6;  // keyframes each time that the camera comes by
 
 // The camera comes by twice and makes landmarks of its own each time, as if it did not know that it was here
 // before.
 struct TwoVisits {
   // The second visit begins at `x`, and is seen through the drift; in a part of the map of its own, or not.
-  explicit TwoVisits(const Sim3& drift, double second_x = 0.05, bool starts_anew = false)
-      : world(1500), map(&world) {
+  // Only some points look the same then.
+  explicit TwoVisits(const Sim3& drift, double second_x = 0.05, bool starts_anew = false,
+                     size_t same_points = kPoints)
+      : world(kPoints), map(&world) {
     for (int visit = 0; visit < 2; ++visit) {
+      if (visit == 1) world.Repaint(same_points);
       const PartId part = visit == 0 || starts_anew ? map.map.BeginPart() : PartId(0);
       for (int i = 0; i < kPasses; ++i) {
         const double x = 0.1 * i + (visit == 0 ? first_x : first_x + second_x);
@@ -137,6 +141,19 @@ TEST(LoopCloserTest, OtherPlacesAreRefusedWithAReason) {
   const LoopResult result = visits.Close({.min_score_ratio = 0});
   EXPECT_FALSE(result.linked);
   EXPECT_THAT(result.attempts, Each(Field(&LoopAttempt::reason, Not(IsEmpty()))));
+}
+
+TEST(LoopCloserTest, APartThatLooksTheSameIsNoPlace) {
+  // A tenth of what there is fits exactly, as the ground of two streets may.
+  const auto close = [](double min_found_share) {
+    return TwoVisits(kDrift, 0.05, false, kPoints / 10)
+        .Close({.min_score_ratio = 0, .min_found_share = min_found_share});
+  };
+  EXPECT_TRUE(close(0).corrected);
+  const LoopResult result = close(LoopOptions().min_found_share);
+  EXPECT_FALSE(result.linked);
+  EXPECT_THAT(result.attempts,
+              testing::Contains(Field(&LoopAttempt::reason, testing::HasSubstr("should be visible"))));
 }
 
 TEST(LoopCloserTest, OneKeyframeAloneIsNotBelieved) {

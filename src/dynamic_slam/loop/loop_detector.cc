@@ -56,6 +56,10 @@ int WeightOf(const Keyframe& keyframe, KeyframeId other) {
   return 0;
 }
 
+Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe) {
+  return ToSim3(other.cam_from_world() * keyframe.cam_from_world().Inverse());
+}
+
 Eigen::Vector2d Pixel(const Keypoint& keypoint) { return {keypoint.x, keypoint.y}; }
 
 }  // namespace
@@ -123,6 +127,7 @@ std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
     candidate.attempt.keyframe = keyframe.id();
     candidate.attempt.candidate = place.keyframe;
     candidate.attempt.timestamp_s = keyframe.timestamp_s();
+    candidate.attempt.candidate_timestamp_s = map.keyframes().At(place.keyframe).timestamp_s();
     candidate.attempt.score = place.score;
     candidates.push_back(candidate);
   }
@@ -188,7 +193,7 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
   const Sim3 candidate_from_world = ToSim3(candidate.cam_from_world());
   for (const double radius_px : {kFirstRadiusPx, kSecondRadiusPx}) {
     const Rigid3 pose = ToRigid3(loop.keyframe_from_candidate * candidate_from_world);
-    loop.links = FindLandmarks(map, keyframe, pose, loop.landmarks, radius_px);
+    loop.links = FindLandmarks(map, keyframe, pose, loop.landmarks, radius_px, &attempt->visible);
     std::vector<Sim3Match> matches;
     for (const Loop::Link& link : loop.links) {
       const LandmarkId own = keyframe.landmarks()[link.keypoint];
@@ -196,7 +201,10 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
         AddMatch(map, keyframe, candidate, link.keypoint, link.landmark, &matches);
       }
     }
-    const Sim3Estimate refined = RefineSim3(camera_, matches, options_.sim3, loop.keyframe_from_candidate);
+    const std::vector<Sim3Sighting> sightings =
+        NeighboursSightings(map, keyframe, candidate, loop, radius_px);
+    const Sim3Estimate refined =
+        RefineSim3(camera_, matches, options_.sim3, loop.keyframe_from_candidate, sightings);
     attempt->sim3_inliers = refined.inliers;
     if (!refined.success) {
       attempt->reason = fmt::format("{} of {} landmarks found by projection fit one similarity < {}",
@@ -229,6 +237,11 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
     attempt->reason = fmt::format("{} landmarks found < {}", attempt->inliers, options_.min_inliers);
     return loop;
   }
+  if (attempt->inliers < options_.min_found_share * attempt->visible) {
+    attempt->reason = fmt::format("{} of {} landmarks found that should be visible < {:.0f}%",
+                                  attempt->inliers, attempt->visible, 100 * options_.min_found_share);
+    return loop;
+  }
   if (2 * known > loop.links.size()) {
     attempt->reason = fmt::format("{} of {} landmarks are known already", known, loop.links.size());
     return loop;
@@ -237,10 +250,10 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
   const std::vector<CovisibleKeyframe> neighbours = keyframe.BestCovisible(kNeighbours);
   for (const CovisibleKeyframe& other : neighbours) {
     const Keyframe& neighbour = map.keyframes().At(other.id);
-    const Sim3 neighbour_from_keyframe =
-        ToSim3(neighbour.cam_from_world() * keyframe.cam_from_world().Inverse());
-    const Rigid3 there = ToRigid3(neighbour_from_keyframe * keyframe_from_world);
-    const size_t found = FindLandmarks(map, neighbour, there, loop.landmarks, kSecondRadiusPx).size();
+    const Rigid3 there = ToRigid3(FromKeyframe(neighbour, keyframe) * keyframe_from_world);
+    int visible = 0;
+    const size_t found =
+        FindLandmarks(map, neighbour, there, loop.landmarks, kSecondRadiusPx, &visible).size();
     attempt->confirming += static_cast<int>(found) >= options_.min_confirming_inliers;
   }
   if (attempt->confirming < options_.min_confirming_keyframes) {
@@ -250,10 +263,31 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
   return loop;
 }
 
+std::vector<Sim3Sighting> LoopDetector::NeighboursSightings(const Map& map, const Keyframe& keyframe,
+                                                            const Keyframe& candidate, const Loop& loop,
+                                                            double radius_px) {
+  const Sim3 keyframe_from_world = loop.keyframe_from_candidate * ToSim3(candidate.cam_from_world());
+  std::vector<Sim3Sighting> sightings;
+  for (const CovisibleKeyframe& other : keyframe.BestCovisible(kNeighbours)) {
+    const Keyframe& neighbour = map.keyframes().At(other.id);
+    const Sim3 cam_from_keyframe = FromKeyframe(neighbour, keyframe);
+    const Rigid3 there = ToRigid3(cam_from_keyframe * keyframe_from_world);
+    int visible = 0;
+    for (const Loop::Link& link : FindLandmarks(map, neighbour, there, loop.landmarks, radius_px, &visible)) {
+      const Keypoint& keypoint = neighbour.keypoint(link.keypoint);
+      sightings.push_back({ToRigid3(cam_from_keyframe),
+                           candidate.cam_from_world() * map.landmarks().At(link.landmark).position(),
+                           Pixel(keypoint), map.octave_scales()[static_cast<size_t>(keypoint.octave)]});
+    }
+  }
+  return sightings;
+}
+
 std::vector<Loop::Link> LoopDetector::FindLandmarks(const Map& map, const Keyframe& keyframe,
                                                     const Rigid3& cam_from_world,
                                                     const std::vector<LandmarkId>& landmarks,
-                                                    double radius_px) {
+                                                    double radius_px, int* visible) {
+  *visible = 0;
   std::vector<Loop::Link> links;
   std::vector<uint8_t> taken(keyframe.features().size(), 0);
   for (uint32_t i = 0; i < taken.size(); ++i)
@@ -266,6 +300,7 @@ std::vector<Loop::Link> LoopDetector::FindLandmarks(const Map& map, const Keyfra
                             landmark.max_distance(), &projection)) {
       continue;
     }
+    ++*visible;
     const double scale = map.octave_scales()[static_cast<size_t>(projection.octave)];
     const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
                               static_cast<float>(radius_px * scale), projection.octave - 1,

@@ -17,14 +17,16 @@ namespace dynamic_slam {
 struct LoopAttempt {
   KeyframeId keyframe, candidate;
   double timestamp_s = 0;  // of the keyframe
-  double score = 0;        // of PlaceIndex
-  int matches = 0;         // of landmarks, by their descriptors
-  int sim3_inliers = 0;    // of these
-  int inliers = 0;         // landmarks of the old place that show where the similarity puts them
-  int confirming = 0;      // neighbours of the keyframe that see them too
-  double scale = 1;        // length about the keyframe over the same length about the candidate
-  double drift_px = 0;     // from where the map has the old landmarks to where they are, median
-  std::string reason;      // why it was refused; empty when it was not
+  double candidate_timestamp_s = 0;
+  double score = 0;      // of PlaceIndex
+  int matches = 0;       // of landmarks, by their descriptors
+  int sim3_inliers = 0;  // of these
+  int visible = 0;       // landmarks of the old place that the keyframe should see
+  int inliers = 0;       // of these: show where the similarity puts them
+  int confirming = 0;    // neighbours of the keyframe that see them too
+  double scale = 1;      // length about the keyframe over the same length about the candidate
+  double drift_px = 0;   // from where the map has the old landmarks to where they are, median
+  std::string reason;    // why it was refused; empty when it was not
 };
 
 // A keyframe that sees what was seen before, though the map does not know it.
@@ -67,10 +69,16 @@ class LoopDetector {
   // Fills in the attempt; its reason is empty when it is a loop.
   Loop Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, const Sim3& similarity,
               LoopAttempt* attempt);
-  // What the keyframe sees of the landmarks from where it would be among them.
+  // What the keyframe sees of the landmarks from where it would be among them. *visible: how many of them it
+  // should see.
   std::vector<Loop::Link> FindLandmarks(const Map& map, const Keyframe& keyframe,
                                         const Rigid3& cam_from_world,
-                                        const std::vector<LandmarkId>& landmarks, double radius_px);
+                                        const std::vector<LandmarkId>& landmarks, double radius_px,
+                                        int* visible);
+  // What neighbours of the keyframe see of the old place, if the similarity is right about it.
+  std::vector<Sim3Sighting> NeighboursSightings(const Map& map, const Keyframe& keyframe,
+                                                const Keyframe& candidate, const Loop& loop,
+                                                double radius_px);
 
   Camera camera_;
   LoopOptions options_;

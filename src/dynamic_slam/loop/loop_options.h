@@ -12,6 +12,7 @@ struct LoopOptions {
   int covisible_weight = 15;
   int min_matches = 15;
   int min_inliers = 40;
+  double min_found_share = 0.15;
   int min_confirming_keyframes = 2;
   int min_confirming_inliers = 15;
   double min_drift_px = 3;
@@ -36,6 +37,11 @@ struct LoopOptions {
           OptionField{"", 4, 1000, "Matches of landmarks by their descriptors that a loop needs."});
     visit("min_inliers", self.min_inliers,
           OptionField{"", 4, 1000, "Landmarks of the old place that must fit the keyframe in the end."});
+    visit(
+        "min_found_share", self.min_found_share,
+        OptionField{"", 0, 1,
+                    "These over the landmarks of the old place that the keyframe should see. Ground that "
+                    "looks alike everywhere makes less than a tenth, a place seen again a quarter or more."});
     visit("min_confirming_keyframes", self.min_confirming_keyframes,
           OptionField{"", 0, 5, "Neighbours of the keyframe that must see the old place as well."});
     visit("min_confirming_inliers", self.min_confirming_inliers,

@@ -69,6 +69,13 @@ class SyntheticWorld {
     return view;
   }
 
+  // Points from this one on look different from now on.
+  void Repaint(size_t first) {
+    for (size_t i = first; i < descriptors_.size(); ++i) {
+      descriptors_[i] = {random_.Next(), random_.Next(), random_.Next(), random_.Next()};
+    }
+  }
+
   const Camera& camera() const { return camera_; }
   const Eigen::Vector3d& position(uint32_t point) const { return positions_[point]; }
   size_t size() const { return positions_.size(); }

@@ -107,12 +107,15 @@ std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
 
 std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
   std::string csv =
-      "timestamp,keyframe,candidate,score,matches,sim3_inliers,inliers,confirming,scale,drift_px,refused\n";
+      "timestamp,keyframe,candidate,candidate_timestamp,score,matches,sim3_inliers,visible,inliers,"
+      "confirming,"
+      "scale,drift_px,refused\n";
   for (const LoopAttempt& attempt : attempts) {
-    csv += fmt::format("{:.9f},{},{},{:.4f},{},{},{},{},{:.4f},{:.2f},\"{}\"\n", attempt.timestamp_s,
-                       attempt.keyframe.value(), attempt.candidate.value(), attempt.score, attempt.matches,
-                       attempt.sim3_inliers, attempt.inliers, attempt.confirming, attempt.scale,
-                       attempt.drift_px, attempt.reason);
+    csv +=
+        fmt::format("{:.9f},{},{},{:.9f},{:.4f},{},{},{},{},{},{:.4f},{:.2f},\"{}\"\n", attempt.timestamp_s,
+                    attempt.keyframe.value(), attempt.candidate.value(), attempt.candidate_timestamp_s,
+                    attempt.score, attempt.matches, attempt.sim3_inliers, attempt.visible, attempt.inliers,
+                    attempt.confirming, attempt.scale, attempt.drift_px, attempt.reason);
   }
   return csv;
 }

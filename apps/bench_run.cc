@@ -1,0 +1,100 @@
+#include "bench_run.h"
+
+#include <exception>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/text.h"
+#include "dynamic_slam/io/detector_factory.h"
+#include "source_arguments.h"
+
+namespace dynamic_slam {
+namespace {
+
+// `{source}` in the name of a detector stands for the source's folder, so that each may have its own boxes.
+std::string DetectorFor(std::string name, const std::string& source) {
+  const std::string key = "{source}";
+  const size_t at = name.find(key);
+  return at == std::string::npos ? name : name.replace(at, key.size(), source);
+}
+
+}  // namespace
+
+void AddBenchOptions(CLI::App* command, const std::string& results, BenchArguments* arguments) {
+  BenchArguments& a = *arguments;
+  command->add_option("SOURCE", a.sources, "Sequences, as of run")->required();
+  command->add_option("--camera", a.camera, "As of run");
+  command->add_option("--detector", a.detector,
+                      "As of run; {source} in it stands for the sequence: boxes:{source}/boxes.csv");
+  command->add_option("--models", a.models, "Folder in which network files are looked for too");
+  command->add_option("--config", a.config, "YAML file with options");
+  command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
+      ->type_name("KEY=VALUE");
+  command->add_option("--out", a.out, fmt::format("Folder for {}", results));
+  AddSourceOptions(command, &a.source_options);
+  command->add_flag("--quiet", a.quiet, "No progress");
+}
+
+BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_name,
+                     const std::vector<std::string>& assignments, RunConsole* console,
+                     const std::function<void(const RunProgress&)>& on_frame) {
+  SystemOptions options;
+  if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
+  ApplySet(&options, arguments.assignments);
+  ApplySet(&options, assignments);
+  const std::unique_ptr<FrameSource> source = OpenFrameSource(source_name, arguments.source_options);
+  BenchRun run;
+  run.system = std::make_unique<SlamSystem>(ChooseCamera(arguments.camera, source_name, *source), options);
+  run.system->SetDetector(MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models));
+  RunControl control = console->Control();
+  if (on_frame) {
+    control.on_frame = [console, &on_frame](const RunProgress& progress) {
+      console->Show(progress);
+      on_frame(progress);
+    };
+  }
+  run.summary = RunSequence(*source, *run.system, control);
+  console->End();
+  if (run.summary.failure != nullptr) std::rethrow_exception(run.summary.failure);
+  return run;
+}
+
+std::string ShortName(const std::string& source) {
+  std::filesystem::path path = std::filesystem::path(source).lexically_normal();
+  if (path.filename().empty()) path = path.parent_path();
+  return path.filename().string();
+}
+
+void WriteRows(const std::filesystem::path& folder, const std::string& name,
+               const nlohmann::ordered_json& rows) {
+  std::string csv;
+  for (const nlohmann::ordered_json& row : rows) {
+    std::string keys, values;
+    for (const auto& [key, value] : row.items()) {
+      if (!keys.empty()) {
+        keys += ",";
+        values += ",";
+      }
+      keys += key;
+      values += value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump();
+    }
+    if (csv.empty()) csv = keys + "\n";
+    csv += values + "\n";
+  }
+  WriteFileAtomically(folder / (name + ".csv"), csv);
+  WriteFileAtomically(folder / (name + ".json"), rows.dump(2) + "\n");
+}
+
+void WriteCurves(const std::filesystem::path& folder, const std::string& name, const CurvePlot& plot) {
+  constexpr int kWidthPx = 700, kHeightPx = 480;
+  WritePicture((folder / (name + ".png")).string(), DrawCurves(plot, kWidthPx, kHeightPx));
+}
+
+const cv::Scalar& CurveColour(size_t index) {
+  static const cv::Scalar kColours[] = {kEstimateColour, {60, 60, 200}, {90, 150, 40}, {170, 60, 150}, kInk};
+  return kColours[index % std::size(kColours)];
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+#include <nlohmann/json.hpp>
+
+#include "dynamic_slam/eval/curve_plot.h"
+#include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/system/sequence_runner.h"
+#include "run_console.h"
+
+namespace dynamic_slam {
+
+// What all experiments take.
+struct BenchArguments {
+  std::vector<std::string> sources;
+  std::string camera, detector = "none", models, out, config;
+  std::vector<std::string> assignments;
+  FrameSourceOptions source_options;
+  bool quiet = false;
+};
+
+// Adds their options to the command; `results` are the files that --out takes.
+void AddBenchOptions(CLI::App* command, const std::string& results, BenchArguments* arguments);
+
+struct BenchRun {
+  std::unique_ptr<SlamSystem> system;
+  RunSummary summary;
+};
+
+// Runs the source with these assignments after those of the arguments. `on_frame` may be empty. What a stage
+// throws is thrown here.
+BenchRun RunForBench(const BenchArguments& arguments, const std::string& source,
+                     const std::vector<std::string>& assignments, RunConsole* console,
+                     const std::function<void(const RunProgress&)>& on_frame = {});
+
+// "street" of "data/street/".
+std::string ShortName(const std::string& source);
+
+// The same rows, flat objects with the same keys, as NAME.csv and NAME.json.
+void WriteRows(const std::filesystem::path& folder, const std::string& name,
+               const nlohmann::ordered_json& rows);
+
+// Into NAME.png.
+void WriteCurves(const std::filesystem::path& folder, const std::string& name, const CurvePlot& plot);
+
+// A colour for each of a few curves.
+const cv::Scalar& CurveColour(size_t index);
+
+}  // namespace dynamic_slam

@@ -1,0 +1,108 @@
+"""`dynamic_slam bench` as a user meets it: rows, pictures and what they say."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = ""
+FRAMES = 60
+
+
+def run_program(*arguments):
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True)
+
+
+def read(*path):
+    with open(os.path.join(*path), encoding="utf-8") as file:
+        return file.read()
+
+
+class CliBenchTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = tempfile.mkdtemp()
+        cls.addClassCleanup(shutil.rmtree, cls.shared)
+        cls.room = os.path.join(cls.shared, "room")
+        result = run_program("simulate", "room", "--frames", str(FRAMES), "--out", cls.room)
+        assert result.returncode == 0, result.stderr
+
+    def bench(self, experiment, *arguments):
+        out = os.path.join(self.shared, experiment)
+        result = run_program("bench", experiment, *arguments, "--out", out, "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return out, result.stdout
+
+    def assert_is_picture(self, *path):
+        with open(os.path.join(*path), "rb") as file:
+            self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+
+    def test_ablation_compares_over_common_frames(self):
+        boxes = os.path.join(self.shared, "boxes.csv")  # a person in the right half of each image
+        stamps = [line.split()[0] for line in read(self.room, "rgb.txt").splitlines() if not line.startswith("#")]
+        with open(boxes, "w", encoding="utf-8") as file:
+            file.write("timestamp,class,score,x,y,w,h\n")
+            file.writelines(f"{stamp},person,0.9,320,0,320,480\n" for stamp in stamps)
+        out, _ = self.bench("ablation", self.room, "--max-frames", "30", "--detector", "boxes:" + boxes)
+        rows = json.loads(read(out, "ablation.json"))
+        self.assertEqual([row["variant"] for row in rows][:4], ["none", "hard boxes", "paper", "default"])
+        none = rows[0]
+        self.assertGreater(none["coverage"], 0.7)
+        self.assertFalse(none["failed"])
+        for row in rows:
+            self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.05 * row["path_m"])
+            self.assertEqual(row["common_ape_m"] is None, row["failed"])
+
+    def test_loops_runs_with_and_without_closing(self):
+        # Forward, then the same images backward, so that each place is seen twice.
+        again = os.path.join(self.shared, "again")
+        os.makedirs(os.path.join(again, "rgb"))
+        shutil.copy(os.path.join(self.room, "camera.yaml"), again)
+        images = [line.split() for line in read(self.room, "rgb.txt").splitlines() if not line.startswith("#")]
+        poses = [line.split(" ", 1)[1] for line in read(self.room, "groundtruth.txt").splitlines() if line[0] != "#"]
+        self.assertEqual(len(poses), len(images))
+        with open(os.path.join(again, "rgb.txt"), "w") as rgb, open(os.path.join(again, "groundtruth.txt"), "w") as truth:
+            for i, (image, pose) in enumerate(zip(images + images[::-1], poses + poses[::-1])):
+                rgb.write(f"{i / 10:.6f} {os.path.join(self.room, image[1])}\n")
+                truth.write(f"{i / 10:.6f} {pose}\n")
+        out, text = self.bench("loops", again, "--apart-s", "3")
+        rows = json.loads(read(out, "loops.json"))
+        self.assertEqual([row["closing"] for row in rows], ["without", "with"])
+        without, closing = rows
+        self.assertEqual(without["corrected"] + without["linked"], 0)
+        self.assertGreaterEqual(without["places_seen_again"], 1)
+        self.assertGreaterEqual(without["recall_at_full_precision"], 0.5)
+        self.assertEqual(closing["false_loops"], 0)
+        self.assertIn("again", text)
+        points = json.loads(read(out, "places.json"))
+        self.assertTrue(points)
+        self.assertEqual(sorted(points, key=lambda p: -p["min_score"]), points)
+        self.assertEqual(max(p["recall"] for p in points if p["precision"] == 1), without["recall_at_full_precision"])
+        self.assert_is_picture(out, "places.png")
+
+    def test_scale_gives_a_row_for_each_part_of_the_sequence(self):
+        out, text = self.bench("scale", self.room, "--window", "20", "--mapped-at", "0")
+        rows = json.loads(read(out, "scale_room.json"))
+        self.assertEqual([row["first_frame"] for row in rows], [0, 20, 40])
+        self.assertEqual(len(read(out, "scale_room.csv").splitlines()), 4)
+        for row in rows:
+            self.assertGreater(row["cpu_ms"], 0)
+            self.assertGreater(row["rss_mb"], 1)
+        self.assertGreater(rows[-1]["keyframes"], 1)
+        self.assertEqual(rows[-1]["tracked"], 20)
+        self.assertIn("growth after frame 0", text)
+        self.assert_is_picture(out, "scale_room.png")
+
+    def test_a_source_that_is_not_there_is_an_input_error(self):
+        for experiment in ["ablation", "loops", "scale"]:
+            result = run_program("bench", experiment, os.path.join(self.shared, "nowhere"), "--detector", "none")
+            self.assertEqual(result.returncode, 2, result.stdout)
+            self.assertIn("nowhere", result.stderr)
+
+
+if __name__ == "__main__":
+    PROGRAM = os.path.abspath(sys.argv.pop(1))
+    unittest.main()
