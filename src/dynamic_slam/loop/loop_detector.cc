@@ -60,6 +60,14 @@ Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe) {
   return ToSim3(other.cam_from_world() * keyframe.cam_from_world().Inverse());
 }
 
+int UsableKeypoints(const Keyframe& keyframe) {
+  int usable = 0;
+  for (uint32_t i = 0; i < keyframe.features().size(); ++i) {
+    usable += keyframe.StaticProbability(i) >= kMinStaticProbability;
+  }
+  return usable;
+}
+
 Eigen::Vector2d Pixel(const Keypoint& keypoint) { return {keypoint.x, keypoint.y}; }
 
 }  // namespace
@@ -237,6 +245,8 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
     attempt->reason = fmt::format("{} landmarks found < {}", attempt->inliers, options_.min_inliers);
     return loop;
   }
+  // No image shows more landmarks than it has keypoints for them.
+  attempt->visible = std::min(attempt->visible, UsableKeypoints(keyframe));
   if (attempt->inliers < options_.min_found_share * attempt->visible) {
     attempt->reason = fmt::format("{} of {} landmarks found that should be visible < {:.0f}%",
                                   attempt->inliers, attempt->visible, 100 * options_.min_found_share);
