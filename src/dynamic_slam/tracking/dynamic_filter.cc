@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/map/static_evidence.h"
 #include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/semantics/selective_tracking.h"
@@ -117,6 +118,7 @@ float DynamicFilter::Combine(float prior, float motion_log_odds) const {
 
 DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
                                       const Frame& last, Frame* frame) {
+  DS_TRACE("tracking/judge");
   const bool weights = options_.method == "weights";
   last_objects_.swap(objects_);
   objects_.clear();
@@ -251,6 +253,7 @@ void DynamicFilter::WatchObject(const Mover& mover, const Rigid3& frame_from_las
 
 void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
   if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
+  DS_TRACE("tracking/watch");
   const std::vector<Mover> movers = FindMovers(flow);
   if (movers.empty()) return;
   const Rigid3 frame_from_last = frame->cam_from_world * last.cam_from_world.Inverse();

@@ -76,6 +76,7 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   frame_.ClearLandmarks();
   frame_.reference = last_.reference;
   frame_.reference_unit = 1;
+  DS_TRACE("tracking/flow");
   flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
 }
 
