@@ -68,11 +68,11 @@ DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options
     : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)) {}
 
 float DynamicFilter::Evidence(float static_probability, bool fits) const {
-  if (!options_.landmark_odds || static_probability <= 0 || static_probability >= 1) return 0;
+  if (!options_.landmark_odds || static_probability <= 0) return 0;
   // Frames that follow each other tell nearly the same.
   constexpr double kNews = 0.1;
-  return static_cast<float>(
-      kNews * (EvidenceOfRest(fits) + std::log(static_probability / (1.0 - static_probability))));
+  const double p = std::min<double>(static_probability, 1 - options_.missed_object);
+  return static_cast<float>(kNews * (EvidenceOfRest(fits) + std::log(p / (1 - p))));
 }
 
 bool DynamicFilter::IsHidden(const Eigen::Vector2d& ideal_px) const {
