@@ -15,13 +15,14 @@ std::vector<PrecisionRecall> PrecisionRecallCurve(const std::vector<PlaceAnswer>
   if (places == 0) return curve;
   std::sort(given.begin(), given.end(),
             [](const PlaceAnswer& a, const PlaceAnswer& b) { return *a.score > *b.score; });
-  double right = 0, all = 0;
+  double right = 0, found = 0, all = 0;
   for (size_t i = 0; i < given.size(); ++i) {
     ++all;
     right += given[i].truth == PlaceAnswer::Truth::kRight;
+    found += given[i].truth == PlaceAnswer::Truth::kRight && given[i].has_place;
     // Equal scores cannot be told apart.
     if (i + 1 < given.size() && *given[i + 1].score == *given[i].score) continue;
-    curve.push_back({*given[i].score, right / all, right / places});
+    curve.push_back({*given[i].score, right / all, found / places});
   }
   return curve;
 }

@@ -9,7 +9,7 @@ namespace dynamic_slam {
 struct PlaceAnswer {
   enum class Truth { kRight, kWrong, kUnclear };
 
-  bool has_place = false;  // there is a right answer
+  bool has_place = false;  // there is a right answer that must be found; others may be right too
   // None when nothing looks like it.
   std::optional<double> score;
   Truth truth = Truth::kUnclear;  // of the answer; unclear ones are neither right nor wrong
@@ -19,7 +19,7 @@ struct PlaceAnswer {
 struct PrecisionRecall {
   double min_score = 0;
   double precision = 0;  // right ones over those that are right or wrong
-  double recall = 0;     // right ones over the questions that have a right answer
+  double recall = 0;     // of the questions that have a right answer, those that got one
 };
 
 // One point for each score, from the highest to the lowest. Empty when no question has a right answer.

@@ -32,6 +32,14 @@ TEST(PlaceRecognitionTest, EqualScoresAreOnePoint) {
   EXPECT_DOUBLE_EQ(RecallAtFullPrecision(curve), 0);
 }
 
+TEST(PlaceRecognitionTest, WhatNeedNotBeFoundIsNoRecall) {
+  const std::vector<PrecisionRecall> curve =
+      PrecisionRecallCurve({{true, 0.5, Truth::kWrong}, {false, 0.6, Truth::kRight}});
+  ASSERT_EQ(curve.size(), 2u);
+  EXPECT_DOUBLE_EQ(curve[0].precision, 1);
+  EXPECT_DOUBLE_EQ(curve[0].recall, 0);
+}
+
 TEST(PlaceRecognitionTest, WithoutAPlaceSeenTwiceThereIsNoCurve) {
   EXPECT_TRUE(PrecisionRecallCurve({{false, 0.5, Truth::kWrong}}).empty());
   EXPECT_DOUBLE_EQ(RecallAtFullPrecision({}), 0);

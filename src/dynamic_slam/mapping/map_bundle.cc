@@ -12,6 +12,9 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
+// Landmarks that are refreshed before others may look at the map again.
+constexpr size_t kRefreshedAtOnce = 500;
+
 // A bundle problem made of parts of the map, and the way back.
 class MapBundle {
  public:
@@ -49,12 +52,12 @@ class MapBundle {
         if (!HasPose(observation.keyframe)) continue;
         const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
         const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
-        problem_.observations.push_back({pose_of_[observation.keyframe.value()],
-                                         point,
-                                         {keypoint.x, keypoint.y},
-                                         1.0 / map.octave_scales()[static_cast<size_t>(keypoint.octave)],
-                                         TrustInMatch(keyframe.StaticProbability(observation.keypoint),
-                                                      landmark.static_log_odds)});
+        problem_.observations.push_back(
+            {pose_of_[observation.keyframe.value()],
+             point,
+             {keypoint.x, keypoint.y},
+             1.0 / map.octave_scales()[static_cast<size_t>(keypoint.octave)],
+             TrustInMatch(keyframe.StaticProbability(observation.keypoint), landmark.static_log_odds)});
         links_.push_back({observation, id});
       }
     }
@@ -65,8 +68,33 @@ class MapBundle {
     return AdjustBundle(camera, options, should_stop, &problem_, &is_outlier_);
   }
 
-  // False, and nothing is changed, when this is not the map any more that the problem was made of.
-  bool WriteBack(Map* map) const {
+  // False, and nothing is changed, when this is not the map any more that the problem was made of. Poses and
+  // points move all at once; what follows from that, landmark by landmark, leaves room for others.
+  bool WriteBack(SharedMap* map) const {
+    if (!Move(map->Write().get())) return false;
+    DS_TRACE("mapping/refresh");
+    size_t link = 0;
+    for (size_t i = 0; i < landmarks_.size();) {
+      const auto locked = map->Write();
+      if (locked->epoch() != epoch_) break;
+      for (const size_t end = std::min(i + kRefreshedAtOnce, landmarks_.size()); i < end; ++i) {
+        for (; link < links_.size() && links_[link].landmark == landmarks_[i]; ++link) {
+          if (is_outlier_[link] != 0) Unlink(links_[link], locked.get());
+        }
+        if (locked->landmarks().Contains(landmarks_[i])) locked->RefreshLandmark(landmarks_[i]);
+      }
+    }
+    return true;
+  }
+
+ private:
+  // Of the problem's observations, those of a landmark one after the other.
+  struct Link {
+    Observation observation;
+    LandmarkId landmark;
+  };
+
+  bool Move(Map* map) const {
     if (map->epoch() != epoch_ || map->revision() != revision_) return false;
     if (is_whole_) map->BeginRevision();
     MoveYoungerKeyframes(map);
@@ -81,26 +109,16 @@ class MapBundle {
         landmark->set_position(problem_.points[i].position);
       }
     }
-    for (size_t i = 0; i < is_outlier_.size(); ++i) {
-      if (is_outlier_[i] == 0) continue;
-      // The link may have gone with an earlier one of its landmark.
-      const Observation& observation = links_[i].observation;
-      const Keyframe* keyframe = map->keyframes().Find(observation.keyframe);
-      if (keyframe != nullptr && keyframe->landmarks()[observation.keypoint] == links_[i].landmark) {
-        map->Unlink(observation.keyframe, observation.keypoint);
-      }
-    }
-    for (const LandmarkId id : landmarks_) {
-      if (map->landmarks().Contains(id)) map->RefreshLandmark(id);
-    }
     return true;
   }
 
- private:
-  struct Link {
-    Observation observation;
-    LandmarkId landmark;
-  };
+  // The link may have gone with an earlier one of its landmark, or by others.
+  static void Unlink(const Link& link, Map* map) {
+    const Keyframe* keyframe = map->keyframes().Find(link.observation.keyframe);
+    if (keyframe != nullptr && keyframe->landmarks()[link.observation.keypoint] == link.landmark) {
+      map->Unlink(link.observation.keyframe, link.observation.keypoint);
+    }
+  }
 
   bool HasPose(KeyframeId id) const { return id.value() < pose_of_.size() && pose_of_[id.value()] != kNone; }
 
@@ -127,7 +145,7 @@ class MapBundle {
   std::vector<uint8_t> seen_;      // by landmark id
   std::vector<KeyframeId> keyframes_;
   std::vector<LandmarkId> landmarks_;
-  std::vector<Link> links_;  // of the problem's observations
+  std::vector<Link> links_;
 };
 
 MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& map) {
@@ -181,7 +199,7 @@ MapBundle WholeBundle(const Map& map) {
 BundleSummary SolveAndWriteBack(const Camera& camera, const BundleOptions& options,
                                 const std::function<bool()>& should_stop, MapBundle* bundle, SharedMap* map) {
   BundleSummary summary = bundle->Solve(camera, options, should_stop);
-  summary.usable = summary.usable && bundle->WriteBack(map->Write().get());
+  summary.usable = summary.usable && bundle->WriteBack(map);
   return summary;
 }
 
