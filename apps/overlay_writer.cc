@@ -17,8 +17,9 @@ void TintMask(const std::vector<DynamicBox>& objects, cv::Mat* picture) {
   for (const DynamicBox& object : objects) {
     if (!object.is_dynamic) continue;
     const Box& box = object.box;
-    const cv::Rect area = cv::Rect(cv::Point2d(box.x, box.y), cv::Point2d(box.x + box.width, box.y + box.height)) &
-                          cv::Rect({}, picture->size());
+    const cv::Rect area =
+        cv::Rect(cv::Point2d(box.x, box.y), cv::Point2d(box.x + box.width, box.y + box.height)) &
+        cv::Rect({}, picture->size());
     if (area.empty()) continue;
     cv::Mat part = (*picture)(area);
     part = (1 - kTint) * part + kTint * cv::Scalar(60, 60, 230);

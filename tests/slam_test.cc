@@ -159,7 +159,8 @@ TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
 
 TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
   const Room room = MakeRoom(150), other = MakeRoom(60, 2);
-  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), Frames(other, 0, 50)), Frames(room, 80, 150)));
+  const WholeRun run =
+      RunImages(Join(Join(Frames(room, 0, 80), Frames(other, 0, 50)), Frames(room, 80, 150)));
   const RunSummary& summary = run.summary;
   EXPECT_EQ(summary.reset_count, 0);
   const auto restart = std::find_if(summary.frames.begin(), summary.frames.end(), [](const auto& frame) {

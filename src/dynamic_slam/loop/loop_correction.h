@@ -10,9 +10,9 @@
 
 namespace dynamic_slam {
 
-// The essential graph of a part of the map (Mur-Artal et al. 2015, section III-D): a spanning tree over the keyframes,
-// those that share much, and loops; and what its optimisation does to the map. Keyframes and landmarks that
-// came in the meantime go along with what is around them.
+// The essential graph of a part of the map (Mur-Artal et al. 2015, section III-D): a spanning tree over the
+// keyframes, those that share much, and loops; and what its optimisation does to the map. Keyframes and
+// landmarks that came in the meantime go along with what is around them.
 class LoopCorrection {
  public:
   // older_loops: pairs of keyframes to hold together.

@@ -77,9 +77,7 @@ void Map::ErasePart(PartId part) {
   std::vector<LandmarkId> landmarks;
   landmarks_.ForEach([&](const Landmark& landmark) {
     if (landmark.observations().empty()) return;
-    if (keyframes_.At(landmark.observations().front().keyframe).part() == part) {
-      landmarks.push_back(landmark.id());
-    }
+    if (PartOf(landmark) == part) landmarks.push_back(landmark.id());
   });
   for (const LandmarkId id : landmarks) EraseLandmark(id);
   std::vector<KeyframeId> keyframes;
@@ -98,9 +96,7 @@ void Map::MergePart(PartId from, PartId into, const Sim3& into_from_from) {
   BeginRevision();
   landmarks_.ForEach([&](Landmark& landmark) {
     if (landmark.observations().empty()) return;
-    if (keyframes_.At(landmark.observations().front().keyframe).part() == from) {
-      landmark.Transform(into_from_from);
-    }
+    if (PartOf(landmark) == from) landmark.Transform(into_from_from);
   });
   const Sim3 from_from_into = into_from_from.Inverse();
   keyframes_.ForEach([&](Keyframe& keyframe) {
@@ -290,8 +286,7 @@ std::vector<std::string> Map::Validate() const {
     KeyframeId previous;
     for (const Observation& observation : landmark.observations()) {
       const Keyframe* keyframe = keyframes_.Find(observation.keyframe);
-      if (keyframe != nullptr &&
-          keyframe->part() != keyframes_.At(landmark.observations().front().keyframe).part()) {
+      if (keyframe != nullptr && keyframe->part() != PartOf(landmark)) {
         problems.push_back(fmt::format("landmark {}: seen in two parts of the map", id));
       }
       if (previous.IsValid() && observation.keyframe <= previous) {

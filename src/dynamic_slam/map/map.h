@@ -14,8 +14,9 @@ namespace dynamic_slam {
 
 // Keyframes, landmarks and who sees what: the one object that the stages share.
 //
-// Where tracking was lost and started anew, the map has several parts. Each has an origin and a unit of length
-// of its own, and no landmark in common with another, until a place is known again and they become one.
+// Where tracking was lost and started anew, the map has several parts. Each has an origin and a unit of
+// length of its own, and no landmark in common with another, until a place is known again and they become
+// one.
 //
 // Each link between a keypoint and a landmark is kept on both sides, and each pair of keyframes knows how
 // many landmarks it shares; both hold after every call.
@@ -92,6 +93,10 @@ class Map {
   // The part of the map in which such a frame is; not valid when it is gone.
   PartId PartOf(KeyframeId reference) const;
 
+  PartId PartOf(const Landmark& landmark) const {
+    return keyframes_.At(landmark.observations().front().keyframe).part();
+  }
+
   // The unit of a keyframe, and of the keyframe's heir for one that is gone.
   double UnitOf(KeyframeId reference) const;
 
@@ -117,8 +122,8 @@ class Map {
   IdTable<LandmarkId, Landmark> landmarks_;
   PlaceIndex places_;
   std::vector<KeyframeId> origins_{KeyframeId()};  // by part
-  std::vector<LandmarkId> merged_into_;  // by landmark id; filled as far as needed
-  std::vector<Anchor> heirs_;            // by keyframe id; not valid while the keyframe lives
+  std::vector<LandmarkId> merged_into_;            // by landmark id; filled as far as needed
+  std::vector<Anchor> heirs_;                      // by keyframe id; not valid while the keyframe lives
 };
 
 }  // namespace dynamic_slam

@@ -10,9 +10,9 @@
 namespace dynamic_slam {
 
 // Both copy what they need out of the map, solve while others go on with it, and write back unless the map's
-// epoch is not `epoch` (any more), or its revision has changed: then the summary is not usable. Links that do not fit are broken.
-// Keyframes that were inserted meanwhile move with those that they are linked to. `should_stop` may be empty;
-// it is asked between steps.
+// epoch is not `epoch` (any more), or its revision has changed: then the summary is not usable. Links that do
+// not fit are broken. Keyframes that were inserted meanwhile move with those that they are linked to.
+// `should_stop` may be empty; it is asked between steps.
 
 // Bundle adjustment of the keyframe, its best neighbours and all they see; others that see it too stay fixed.
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,

@@ -120,6 +120,17 @@ std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
   return csv;
 }
 
+std::vector<Eigen::Vector3f> LandmarksOfMainPart(const SlamSystem& system) {
+  std::vector<Eigen::Vector3f> points;
+  const std::vector<PartId> parts = system.Parts();
+  if (parts.empty()) return points;
+  const auto map = system.map().Read();
+  map->landmarks().ForEach([&](const Landmark& landmark) {
+    if (map->PartOf(landmark) == parts.front()) points.push_back(landmark.position().cast<float>());
+  });
+  return points;
+}
+
 // Those of further parts of the map; files of an earlier run in the folder go.
 void WriteFurtherTrajectories(const std::filesystem::path& folder, const SlamSystem& system) {
   const std::vector<PartId> parts = system.Parts();
@@ -183,10 +194,7 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
   }
   WriteFileAtomically(folder / "frames.csv", FramesCsv(summary.frames));
   WriteFileAtomically(folder / "loops.csv", LoopsCsv(summary.loops.attempts));
-  std::vector<Eigen::Vector3f> points;
-  system.map().Read()->landmarks().ForEach(
-      [&points](const Landmark& landmark) { points.push_back(landmark.position().cast<float>()); });
-  WritePly(folder / "map.ply", points);
+  WritePly(folder / "map.ply", LandmarksOfMainPart(system));
   WriteFileAtomically(folder / "config.yaml", OptionsToYaml(system.options()));
   WriteFileAtomically(
       folder / "summary.json",

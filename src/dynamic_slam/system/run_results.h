@@ -70,9 +70,9 @@ struct RunSummary {
 // What `failure` says; "" when there is none.
 std::string FailureMessage(const RunSummary& summary);
 
-// Writes trajectory.txt, trajectory_2.txt and so on for further parts of the map, keyframes.txt, frames.csv, loops.csv, map.ply, config.yaml, summary.json and, for a
-// KITTI source in which every frame has a pose, trajectory_kitti.txt into the folder, which is made. Throws
-// InputError when that is not possible.
+// Writes trajectory.txt, trajectory_2.txt and so on for further parts of the map, keyframes.txt, frames.csv,
+// loops.csv, map.ply, config.yaml, summary.json and, for a KITTI source in which every frame has a pose,
+// trajectory_kitti.txt into the folder, which is made. Throws InputError when that is not possible.
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);
 
 // Makes the folder and checks that files can be written there, so that a long run does not end in an error.

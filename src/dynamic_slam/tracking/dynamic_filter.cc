@@ -169,8 +169,8 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   return counts;
 }
 
-// A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one of
-// these objects, each as likely as the other.
+// A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
+// of these objects, each as likely as the other.
 double DynamicFilter::AtRestByBoxes(const Keypoint& keypoint, bool* in_box) const {
   const bool weights = options_.method == "weights";
   const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
@@ -234,8 +234,8 @@ std::vector<DynamicFilter::Mover> DynamicFilter::FindMovers(const KeypointFlow& 
   return movers;
 }
 
-// Whether the object as a whole moved. Where what is at rest shows no parallax, neither does an object that is
-// far off or that drives ahead.
+// Whether the object as a whole moved. Where what is at rest shows no parallax, neither does an object that
+// is far off or that drives ahead.
 void DynamicFilter::WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth) {
   const Eigen::Vector2d raw(mover.from.CenterX(), mover.from.CenterY());
   const Eigen::Vector2d before_px = camera_.Undistort(raw);
@@ -295,8 +295,7 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
       if (apart_px < kApart * sigma_px) continue;
       const double log_moves = -0.5 * Square((px - moved_px).norm() / mover_sigma_px) -
                                std::log(2 * std::numbers::pi * mover_sigma_px * mover_sigma_px);
-      const double ratio =
-          std::log(std::exp(log_rest) + mismatch) - std::log(std::exp(log_moves) + mismatch);
+      const double ratio = std::log(std::exp(log_rest) + mismatch) - std::log(std::exp(log_moves) + mismatch);
       evidence = std::abs(ratio) > std::abs(evidence) ? ratio : evidence;
     }
     float& odds = frame->motion_log_odds[i];

@@ -84,7 +84,7 @@ class DynamicFilter {
   std::vector<float> octave_scales_;
   std::vector<Object> objects_, last_objects_;
   std::map<int, double> object_log_odds_;  // of moving, by track id: what their motion tells beside the class
-  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
+  std::vector<float> prior_;               // P(at rest) of each keypoint by the boxes alone
 };
 
 }  // namespace dynamic_slam

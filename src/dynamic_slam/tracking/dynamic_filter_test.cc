@@ -166,9 +166,7 @@ TEST_F(DynamicFilterTest, SaysWhenOnlyPeopleMove) {
   DynamicFilter filter = Make("weights");
   flow_.Clear(frame_);
   filter.Judge(std::vector{Person(0)}, flow_, last_, &frame_);
-  const auto moved = [](double x, double shift_px) {
-    return PointMotion{{x, 200}, {x + shift_px, 200}};
-  };
+  const auto moved = [](double x, double shift_px) { return PointMotion{{x, 200}, {x + shift_px, 200}}; };
   std::vector<PointMotion> motions;
   for (int i = 0; i < 10; ++i) motions.push_back(moved(220 + 10 * i, i < 5 ? 6 : 0));  // in the box
   for (int i = 0; i < 10; ++i) motions.push_back(moved(400 + 10 * i, 0.3));

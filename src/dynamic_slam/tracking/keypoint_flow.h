@@ -23,8 +23,8 @@ class KeypointFlow {
   // (SelectiveOptions::ring_ratio).
   static constexpr double kReach = 0.25;
 
-  // What an object or the camera's translation adds to the camera's rotation, at most: somebody who walks past
-  // at 2.3 m/s and a distance of 2 m.
+  // What an object or the camera's translation adds to the camera's rotation, at most: somebody who walks
+  // past at 2.3 m/s and a distance of 2 m.
   static constexpr double kMaxRate_rad_s = 1.15;
 
   KeypointFlow(const Camera& camera, std::vector<float> octave_scales)

@@ -150,8 +150,7 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     if (!frame->landmarks[i].IsValid()) continue;
     const Keypoint& keypoint = frame->features.keypoints[i];
     observations_.Add(frame->points[i], {keypoint.x, keypoint.y},
-                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)],
-                      TrustIn(*frame, i));
+                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)], TrustIn(*frame, i));
     observed_keypoints_.push_back(i);
   }
   rejected_.clear();

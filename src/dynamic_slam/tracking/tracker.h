@@ -41,7 +41,7 @@ struct TrackingResult {
   std::vector<KeyframeId> new_keyframes;     // inserted into the map, waiting for local mapping
   uint32_t map_epoch = 0;                    // of the map that they belong to
   std::vector<EarlierFrame> earlier_frames;  // that have a pose since the map was made
-  bool part_was_erased = false;  // of the map, with the poses of the frames in it
+  bool part_was_erased = false;              // of the map, with the poses of the frames in it
 };
 
 // Which landmarks were to be seen in frames, and which were found; the map is told with the next keyframe.
@@ -134,7 +134,7 @@ class Tracker {
   Frame frame_, last_;
   bool last_has_pose_ = false;
   bool start_is_certain_ = true;
-  PartId start_part_;  // of the map, that the last start made
+  PartId start_part_;               // of the map, that the last start made
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
   double velocity_dt_s_ = 0;        // the time between these two
   KeyframeId last_keyframe_;

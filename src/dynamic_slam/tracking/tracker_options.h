@@ -100,10 +100,11 @@ struct TrackerOptions {
           OptionField{"", 4, 1000, "Inliers that a first guess of the pose needs."});
     visit("min_inliers", self.min_inliers,
           OptionField{"", 4, 1000, "Inliers with less than which the camera is lost."});
-    visit("movers_min_inliers", self.movers_min_inliers,
-          OptionField{"", 4, 1000,
-                      "The same in a view that is full of movers; in between as far as their boxes fill it, as "
-                      "what is left is narrow, and more is found by chance."});
+    visit(
+        "movers_min_inliers", self.movers_min_inliers,
+        OptionField{"", 4, 1000,
+                    "The same in a view that is full of movers; in between as far as their boxes fill it, as "
+                    "what is left is narrow, and more is found by chance."});
     visit("min_relocalisation_inliers", self.min_relocalisation_inliers,
           OptionField{"", 4, 1000, "Inliers that it takes to be found again."});
     visit("local_keyframes", self.local_keyframes,
