@@ -218,6 +218,14 @@ def draw_curves(log, file):
     cv2.imwrite(str(file), picture)
 
 
+def rate_share(step, steps):
+    """Of the highest learning rate: it rises, stays, and falls to zero in the last third.
+
+    So a checkpoint from before the last third can be ended with any number of steps, as if that had been planned.
+    """
+    return min(step / 100, 1.0, (steps - step) / (steps / 3))
+
+
 def unseen_loss(model, loader, loss):
     """Both parts of the loss on images of other scenes, as they are."""
     parts = []
@@ -235,11 +243,11 @@ def main():
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/apps/dynamic_slam")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "out/train_ssd", help="rendered images, checkpoints")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "models")
-    parser.add_argument("--scenes", type=int, default=300)
+    parser.add_argument("--scenes", type=int, default=180)
     parser.add_argument("--steps", type=int, default=2000)
-    parser.add_argument("--batch", type=int, default=32)
-    parser.add_argument("--rate", type=float, default=4e-3, help="highest learning rate")
-    parser.add_argument("--threads", type=int, default=1, help="of PyTorch; another number rounds differently")
+    parser.add_argument("--batch", type=int, default=16)
+    parser.add_argument("--rate", type=float, default=2.5e-3, help="highest learning rate")
+    parser.add_argument("--threads", type=int, default=2, help="of PyTorch; another number rounds differently")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in --work")
     arguments = parser.parse_args()
 
@@ -255,14 +263,11 @@ def main():
     model = SmallSsd().to(memory_format=torch.channels_last)  # faster by a quarter
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(anchors)} anchors", flush=True)
     optimizer = torch.optim.AdamW(model.parameters(), lr=arguments.rate, weight_decay=1e-3)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, arguments.rate, total_steps=arguments.steps + 1,
-                                                   pct_start=0.1)
     first, log, checkpoint = 0, [], arguments.work / "checkpoint.pt"
     if arguments.resume:
         state = torch.load(checkpoint)
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])
-        schedule.load_state_dict(state["schedule"])
         first, log = state["step"], state["log"]
     varied = RenderedImages(frames, arguments.steps * arguments.batch, seed=1)
     rest = torch.utils.data.Subset(varied, range(first * arguments.batch, len(varied)))
@@ -272,12 +277,13 @@ def main():
     arguments.out.mkdir(parents=True, exist_ok=True)
     recent, begin, model = [], time.time(), model.train()
     for step, (images, labels, codes) in enumerate(loader, start=first + 1):
+        for group in optimizer.param_groups:
+            group["lr"] = arguments.rate * rate_share(step, arguments.steps)
         confidence, location = loss(*model(normalised(images)), labels, codes)
         optimizer.zero_grad()
         (confidence + location).backward()
         nn.utils.clip_grad_norm_(model.parameters(), 10)
         optimizer.step()
-        schedule.step()
         recent.append([float(confidence), float(location)])
         if step % 100 == 0 or step == arguments.steps:
             train, other = np.mean(recent, axis=0), unseen_loss(model, plain, loss)
@@ -287,7 +293,7 @@ def main():
             print(f"step {step}: training {train[0]:.3f} + {train[1]:.3f}, unseen scenes {other[0]:.3f} + "
                   f"{other[1]:.3f}; {(time.time() - begin) / 60:.1f} min", flush=True)
             torch.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(),
-                        "schedule": schedule.state_dict(), "step": step, "log": log}, checkpoint)
+                        "step": step, "log": log}, checkpoint)
             export(model, anchors, arguments.out)
     with open(arguments.out / "builtin_training.csv", "w", newline="") as stream:
         writer = csv.DictWriter(stream, log[0].keys(), lineterminator="\n")
