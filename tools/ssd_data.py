@@ -14,11 +14,11 @@ import numpy as np
 import torch
 
 CLASSES = ["person", "car", "chair", "tv", "potted plant"]  # labels 1 to 5; 0 is background
-INPUT = (320, 240)  # width, height, px
+INPUT = (192, 144)  # width, height, px
 RENDERED = (400, 300)
 FRAMES_PER_SCENE = 14
 SURE_VISIBLE = 0.2  # objects that are seen less are neither object nor background
-MIN_HEIGHT_PX = 9  # nor those that are smaller, in the network's input
+MIN_HEIGHT_PX = 8  # nor those that are smaller, in the network's input
 
 
 def scene(seed):
@@ -168,11 +168,11 @@ class RenderedImages(torch.utils.data.Dataset):
 
     def varied(self, rng):
         image, boxes = self.read(int(rng.integers(len(self.frames))))
-        if rng.random() < 0.35:
+        if rng.random() < 0.25:
             image, boxes = self.with_movers(rng, image, boxes)
         height, width = image.shape[:2]
         # About the image, a part of it, or it and something around it.
-        low, high = ((0.95, 1.3), (1.0, 2.8), (0.45, 1.0))[rng.choice(3, p=[0.5, 0.32, 0.18])]
+        low, high = ((0.95, 1.3), (1.0, 2.5), (0.5, 1.0))[rng.choice(3, p=[0.6, 0.26, 0.14])]
         zoom, stretch = np.exp(rng.uniform(np.log(low), np.log(high))), np.exp(rng.uniform(-0.13, 0.13))
         scale = np.array([INPUT[0] / width * zoom * stretch, INPUT[1] / height * zoom / stretch])
         # Parts are aimed at an object in two of three, and show nothing beyond the image.
@@ -188,7 +188,7 @@ class RenderedImages(torch.utils.data.Dataset):
             matrix[0] = [-sx, 0, INPUT[0] - shift[0]]
         fill = rng.uniform(0, 255, 3).tolist()
         image, boxes = self.framed(image, boxes, matrix, fill)
-        if rng.random() < 0.2:
+        if rng.random() < 0.1:
             boxes = self.cover(rng, image, boxes)
         return self.developed(rng, image), boxes
 
@@ -220,7 +220,7 @@ class RenderedImages(torch.utils.data.Dataset):
         """Something without a name before the image."""
         boxes = boxes.copy()
         for _ in range(int(rng.integers(1, 4))):
-            w, h = rng.integers(10, 110, 2)
+            w, h = rng.integers(8, 70, 2)
             x, y = rng.integers(0, INPUT[0] - w), rng.integers(0, INPUT[1] - h)
             image[y:y + h, x:x + w] = texture(rng, (int(w), int(h)))
             for box in boxes:
