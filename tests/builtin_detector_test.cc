@@ -1,4 +1,5 @@
-// The detector that comes with the program: its files, and what it finds in rendered scenes that it did not learn from.
+// The detector that comes with the program: its files, and what it finds in rendered scenes that it did not
+// learn from.
 
 #include <filesystem>
 
