@@ -13,6 +13,7 @@
 #include "cmd_bench.h"
 #include "dynamic_slam/sim/simulation.h"
 #include "experiment.h"
+#include "render_sequence.h"
 #include "run_console.h"
 
 namespace dynamic_slam {
@@ -115,10 +116,10 @@ std::vector<Start> RunScene(const InitArguments& arguments, SceneOptions scene, 
   const std::string sequence = (std::filesystem::path(arguments.out) / "sequence").string();
   RenderScene(scene, sequence);
   std::vector<Start> starts;
-  for (const bool semantics : {true, false}) {
-    Start start = RunOnce(semantics ? arguments : WithoutSemantics(arguments), sequence, console);
+  for (const BenchArguments& run : {BenchArguments(arguments), WithoutSemantics(arguments)}) {
+    Start start = RunOnce(run, sequence, console);
     start.fixed = fixed;
-    start.semantics = semantics;
+    start.semantics = starts.empty();
     start.seed = seed;
     starts.push_back(start);
   }

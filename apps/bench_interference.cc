@@ -14,6 +14,7 @@
 #include "dynamic_slam/sim/simulation.h"
 #include "experiment.h"
 #include "mask_folder.h"
+#include "render_sequence.h"
 #include "run_console.h"
 
 namespace dynamic_slam {
@@ -201,7 +202,6 @@ void RunInterference(const InterferenceArguments& arguments, int* exit_code) {
     SceneOptions options = scene;
     options.seed = seed;
     if (arguments.frames > 0) options.frames = arguments.frames;
-    std::filesystem::remove_all(sequence / "masks");  // of another seed
     RenderScene(options, sequence);
     const Simulation simulation(options);
     const Run with = RunOnce(arguments, sequence, simulation, &console);

@@ -13,6 +13,7 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/sim/simulation.h"
 #include "experiment.h"
+#include "render_sequence.h"
 #include "run_console.h"
 #include "source_arguments.h"
 

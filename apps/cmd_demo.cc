@@ -15,7 +15,7 @@
 #include "dynamic_slam/sim/simulation.h"
 #include "experiment.h"
 #include "frame_picture.h"
-#include "render_room.h"
+#include "render_sequence.h"
 #include "run_console.h"
 
 namespace dynamic_slam {

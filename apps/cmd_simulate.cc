@@ -13,8 +13,7 @@
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/sim/room.h"
 #include "dynamic_slam/sim/simulation.h"
-#include "experiment.h"
-#include "render_room.h"
+#include "render_sequence.h"
 
 namespace dynamic_slam {
 namespace {

@@ -5,12 +5,10 @@
 #include <set>
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/semantics/dynamic_prior.h"
-#include "dynamic_slam/sim/simulation_writer.h"
 
 namespace dynamic_slam {
 namespace {
@@ -83,17 +81,6 @@ std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::sp
     movers.push_back(record);
   }
   return movers;
-}
-
-void RenderScene(const SceneOptions& options, const std::filesystem::path& folder, bool with_depth) {
-  const Simulation simulation(options);
-  const bool terminal = isatty(STDERR_FILENO) != 0;
-  WriteSimulation(simulation, folder, with_depth, [&](int frames) {
-    if (terminal) fmt::print(stderr, "\rrendered {} of {} frames", frames, options.frames);
-  });
-  if (terminal) fmt::print(stderr, "\n");
-  fmt::print("{}: {} frames, path {:.2f} m, seed {}\n", folder.string(), simulation.truth().size(),
-             PathLength(ToPoseList(simulation.truth())), options.seed);
 }
 
 nlohmann::ordered_json OrNull(const std::optional<double>& value) {

@@ -12,7 +12,6 @@
 #include "dynamic_slam/eval/detection_metrics.h"
 #include "dynamic_slam/eval/trajectory_plot.h"
 #include "dynamic_slam/io/box_file.h"
-#include "dynamic_slam/sim/scene_options.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "bench_run.h"
 #include "run_console.h"
@@ -53,9 +52,6 @@ BenchArguments WithoutSemantics(BenchArguments arguments);
 // prior: people and cars, no chairs. Those lower than 30 px count as hidden, as a small network cannot know
 // them (detection_metrics.h: neither found nor missed). Empty where the folder has no boxes.csv.
 std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::span<const double> stamps_s);
-
-// Renders a scene as a sequence into the folder, replacing one that is there, with progress on a terminal.
-void RenderScene(const SceneOptions& options, const std::filesystem::path& folder, bool with_depth = false);
 
 // The number, or null.
 nlohmann::ordered_json OrNull(const std::optional<double>& value);
