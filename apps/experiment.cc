@@ -3,12 +3,14 @@
 #include <cmath>
 #include <cstdint>
 #include <set>
+#include <utility>
 
 #include <fmt/core.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/semantics/dynamic_prior.h"
+#include "dynamic_slam/semantics/dynamic_score.h"
 
 namespace dynamic_slam {
 namespace {
@@ -16,6 +18,13 @@ namespace {
 constexpr double kMinTrueHeightPx = 30;
 
 int64_t Microseconds(double stamp_s) { return std::llround(stamp_s * 1e6); }
+
+std::vector<BoxRecord> MoversOf(std::vector<BoxRecord> records) {
+  const DynamicPrior prior = LoadDynamicPrior("dynamic_prior");
+  const double threshold = DynamicScoreOptions().threshold;
+  std::erase_if(records, [&](const BoxRecord& record) { return prior.Score(record.class_name) <= threshold; });
+  return records;
+}
 
 std::optional<TruthComparison> Compare(const std::string& source, const Trajectory& estimate) {
   const std::optional<Trajectory> truth = LoadGroundTruth(source);
@@ -53,7 +62,8 @@ ExperimentRun RunExperiment(const BenchArguments& arguments, const std::string& 
   run.summary.source = source;
   run.trajectory = bench.system->FrameTrajectory();
   if (bench.detector != nullptr) {
-    run.detected = bench.detector->records();
+    run.detected = MoversOf(bench.detector->records());
+    run.compensated = MoversOf(std::move(run.compensated));
     CompareRecall(source, &run);
   }
   run.truth = Compare(source, run.trajectory);
@@ -68,17 +78,13 @@ BenchArguments WithoutSemantics(BenchArguments arguments) {
 
 std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::span<const double> stamps_s) {
   if (!std::filesystem::exists(sequence / "boxes.csv")) return {};
-  const DynamicPrior prior = LoadDynamicPrior("dynamic_prior");
-  const double threshold = DynamicScoreOptions().threshold;
   std::set<int64_t> wanted;
   for (const double stamp_s : stamps_s) wanted.insert(Microseconds(stamp_s));
-  std::vector<BoxRecord> movers;
-  for (BoxRecord record : ReadBoxFile(sequence / "boxes.csv")) {
-    if (prior.Score(record.class_name) <= threshold || !wanted.contains(Microseconds(record.timestamp_s))) {
-      continue;
-    }
+  std::vector<BoxRecord> movers = MoversOf(ReadBoxFile(sequence / "boxes.csv"));
+  std::erase_if(movers,
+                [&](const BoxRecord& record) { return !wanted.contains(Microseconds(record.timestamp_s)); });
+  for (BoxRecord& record : movers) {
     if (record.box.height < kMinTrueHeightPx) record.visible = 0;
-    movers.push_back(record);
   }
   return movers;
 }

@@ -27,8 +27,8 @@ struct ExperimentRun {
   RunSummary summary;
   Trajectory trajectory;                 // of the main part of the map
   std::optional<TruthComparison> truth;  // none without truth, or where the camera went nowhere
-  std::vector<BoxRecord> detected;       // what the detector said of each image
-  std::vector<BoxRecord> compensated;    // the objects that tracking was told of
+  std::vector<BoxRecord> detected;       // movers by their class, as the detector named them
+  std::vector<BoxRecord> compensated;    // the same as tracking was told of them
   DetectionMetrics recall_before, recall_after;  // by TrueMovers; of nothing without truth
 
   double Coverage() const { return summary.Coverage(); }  // live
@@ -48,8 +48,8 @@ ExperimentRun RunExperiment(const BenchArguments& arguments, const std::string& 
 // The same arguments without the semantic part.
 BenchArguments WithoutSemantics(BenchArguments arguments);
 
-// The true boxes in the images of the stamps (s, in order) of all whose class is dynamic by the program's own
-// prior: people and cars, no chairs. Those lower than 30 px count as hidden, as a small network cannot know
+// The true boxes, in the images of the stamps (s), of movers: people and cars, parked ones too, whose class the
+// program's own prior calls dynamic. Those lower than 30 px count as hidden, as a small network cannot know
 // them (detection_metrics.h: neither found nor missed). Empty where the folder has no boxes.csv.
 std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::span<const double> stamps_s);
 
