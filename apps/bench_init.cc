@@ -31,8 +31,8 @@ struct InitArguments : BenchArguments {
 struct Start {
   bool fixed = false, semantics = false;
   uint64_t seed = 0;
-  double end_s = 0;                   // of the sequence
-  std::optional<double> started_s;    // the first pose
+  double end_s = 0;                 // of the sequence
+  std::optional<double> started_s;  // the first pose
   bool tracks_at_end = false;
   std::optional<double> error_share;  // APE over the path
 
@@ -62,7 +62,8 @@ int CountGood(const std::vector<Start>& starts, bool fixed, bool semantics) {
   }));
 }
 
-// A line for each repetition, from the start to the end of the sequence; a short one where there was no start.
+// A line for each repetition, from the start to the end of the sequence; a short one where there was no
+// start.
 CurvePlot PlotStarts(const std::vector<Start>& starts, bool fixed, bool semantics) {
   CurvePlot plot{"", "time [s]", "repetition", {}};
   const double nan = std::numeric_limits<double>::quiet_NaN();

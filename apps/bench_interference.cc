@@ -21,7 +21,8 @@ namespace dynamic_slam {
 namespace {
 
 // Section 4.2: mean numbers of keypoints of a keyframe.
-constexpr double kPaperKeypoints = 3090, kPaperDynamic = 2290, kPaperStatic = 809, kPaperDynamicShare = 0.7411;
+constexpr double kPaperKeypoints = 3090, kPaperDynamic = 2290, kPaperStatic = 809,
+                 kPaperDynamicShare = 0.7411;
 
 constexpr double kRampS = 0.6;         // in which the camera comes to a stop (sim/camera_motion)
 constexpr double kSpeedWindowS = 0.5;  // a speed is a displacement over so long
@@ -43,7 +44,7 @@ struct KeypointCounts {
 struct Run {
   ExperimentRun run;
   std::vector<KeypointCounts> counts;
-  std::vector<Eigen::Vector2d> speeds;  // time (s), m/s
+  std::vector<Eigen::Vector2d> speeds;      // time (s), m/s
   double stop_speed = 0, moving_speed = 0;  // means, m/s
 
   double DynamicShare() const {
@@ -125,7 +126,9 @@ CurvePlot::Curve StopLines(const CameraOptions& camera, double height) {
 CurvePlot PlotCounts(const Run& with, const CameraOptions& camera) {
   CurvePlot plot{fmt::format("Keypoints: {:.0f}% on people (the paper's Fig. 9: {:.0f}%)",
                              100 * with.DynamicShare(), 100 * kPaperDynamicShare),
-                 "time [s]", "keypoints", {}};
+                 "time [s]",
+                 "keypoints",
+                 {}};
   CurvePlot::Curve dynamic{"on people", kWithoutColour, {}, 1.5}, still{"at rest", kEstimateColour, {}, 1.5},
       wrong{"on people and holding the pose", kInk, {}, 1.5};
   for (const KeypointCounts& count : with.counts) {
@@ -138,7 +141,8 @@ CurvePlot PlotCounts(const Run& with, const CameraOptions& camera) {
   return plot;
 }
 
-CurvePlot PlotSpeeds(const Trajectory& truth, const Run& with, const Run& without, const CameraOptions& camera) {
+CurvePlot PlotSpeeds(const Trajectory& truth, const Run& with, const Run& without,
+                     const CameraOptions& camera) {
   CurvePlot plot{"Speed of the camera: a stop shows as a stop", "time [s]", "m/s", {}};
   plot.curves = {{"truth", kTruthColour, Speeds(truth, 1), 5},
                  {"without semantics", kWithoutColour, without.speeds, 1.5},
@@ -188,8 +192,8 @@ nlohmann::ordered_json Row(uint64_t seed, bool semantics, const Run& run) {
 
 void PrintRow(uint64_t seed, const char* semantics, const Run& run) {
   fmt::print("{:<6}{:<10}{:>10}{:>10}{:>11}{:>14}{:>13}\n", seed, semantics, Percent(run.run.Coverage(), 1),
-             Percent(run.run.ErrorShare()), Percent(run.DynamicShare(), 1), fmt::format("{:.3f}", run.moving_speed),
-             fmt::format("{:.3f}", run.stop_speed));
+             Percent(run.run.ErrorShare()), Percent(run.DynamicShare(), 1),
+             fmt::format("{:.3f}", run.moving_speed), fmt::format("{:.3f}", run.stop_speed));
 }
 
 void RunInterference(const InterferenceArguments& arguments, int* exit_code) {
@@ -239,7 +243,8 @@ void RunInterference(const InterferenceArguments& arguments, int* exit_code) {
                                           {"keypoints_dynamic", kPaperDynamic},
                                           {"keypoints_static", kPaperStatic},
                                           {"dynamic_share", kPaperDynamicShare}}}});
-  fmt::print("paper: {:.1f}% of the keypoints on people\nresults: {}\n", 100 * kPaperDynamicShare, arguments.out);
+  fmt::print("paper: {:.1f}% of the keypoints on people\nresults: {}\n", 100 * kPaperDynamicShare,
+             arguments.out);
 }
 
 }  // namespace
@@ -257,7 +262,8 @@ void AddInterferenceCommand(CLI::App* bench, int* exit_code) {
   a.out = "out/bench_interference";
   AddRunOptions(command, "interference.csv, .json and .png (first seed), and the counts of each frame", &a);
   command->footer(
-      "Keypoints are on people by the true mask. Speeds are displacements over half a second, in metres by the\n"
+      "Keypoints are on people by the true mask. Speeds are displacements over half a second, in metres by "
+      "the\n"
       "scale of the alignment with the truth. sequence/ in the results holds the images of the last seed.");
   command->callback([arguments, exit_code] { RunInterference(*arguments, exit_code); });
 }

@@ -67,7 +67,8 @@ nlohmann::ordered_json ToJson(const DetectionMetrics& metrics) {
 // How many boxes each frame has, and how many of them were found.
 cv::Mat DrawRecall(const std::string& title, const std::vector<RecallOfFrame>& frames) {
   CurvePlot plot{title, "time [s]", "boxes", {}};
-  CurvePlot::Curve all{"true boxes", kTruthColour, {}, 5}, before{"found by the detector", kWithoutColour, {}, 1.2},
+  CurvePlot::Curve all{"true boxes", kTruthColour, {}, 5},
+      before{"found by the detector", kWithoutColour, {}, 1.2},
       after{"after compensation", kEstimateColour, {}, 1.8};
   for (const RecallOfFrame& frame : frames) {
     const auto add = [&frame](CurvePlot::Curve& curve, size_t count) {
@@ -137,8 +138,8 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
   fmt::print("\n{:<24} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
   PrintRow("detector", run.recall_before);
   PrintRow("after compensation", run.recall_after);
-  fmt::print("{:<24} {:>10} {:>14.3f}\n", "paper, SSD", fmt::format("{} of {}", kPaperFoundBefore, kPaperFrames),
-             share(kPaperFoundBefore));
+  fmt::print("{:<24} {:>10} {:>14.3f}\n", "paper, SSD",
+             fmt::format("{} of {}", kPaperFoundBefore, kPaperFrames), share(kPaperFoundBefore));
   fmt::print("{:<24} {:>10} {:>14.3f}\n", "paper, compensated",
              fmt::format("{} of {}", kPaperFoundAfter, kPaperFrames), share(kPaperFoundAfter));
   fmt::print("results: {}\n", arguments.out);
@@ -160,7 +161,8 @@ void AddRecallCommand(CLI::App* bench, int* exit_code) {
   AddSourceOptions(command, &a.source_options);
   command->footer(
       "Per frame, as the paper counts: at least one object was found, of the frames that show one.\n"
-      "Per box: IoU of 0.5, one to one; boxes that are less than half visible or lower than 30 px do not count.");
+      "Per box: IoU of 0.5, one to one; boxes that are less than half visible or lower than 30 px do not "
+      "count.");
   command->callback([arguments, exit_code] { RunRecall(*arguments, exit_code); });
 }
 

@@ -24,8 +24,9 @@ std::string DetectorFor(std::string name, const std::string& source) {
 
 void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments* arguments) {
   BenchArguments& a = *arguments;
-  command->add_option("--detector", a.detector,
-                      "As of run; {source} in it stands for the sequence: boxes:{source}/boxes.csv")
+  command
+      ->add_option("--detector", a.detector,
+                   "As of run; {source} in it stands for the sequence: boxes:{source}/boxes.csv")
       ->capture_default_str();
   command->add_option("--models", a.models, "Folder in which network files are looked for too");
   command->add_option("--config", a.config, "YAML file with options");

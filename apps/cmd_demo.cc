@@ -38,7 +38,8 @@ class PictureChooser {
   explicit PictureChooser(DemoScene* scene) : scene_(scene) {}
 
   void Watch(const RunProgress& progress) {
-    const size_t stretch = (progress.frame - 1) * kPicturesOfScene / std::max<size_t>(1, progress.frames_total);
+    const size_t stretch =
+        (progress.frame - 1) * kPicturesOfScene / std::max<size_t>(1, progress.frames_total);
     double area = 0;
     for (const DynamicBox& box : progress.result->objects.boxes) area += box.is_dynamic ? box.box.Area() : 0;
     if (stretch == stretch_ && area <= most_area_ && !scene_->frames.empty()) return;
@@ -51,9 +52,8 @@ class PictureChooser {
     scene_->frames.back() = progress.image->image.clone();
     DrawFrame(progress, &scene_->frames.back());
     const DynamicKeypoints& dynamic = progress.result->tracking.dynamic;
-    scene_->captions.back() =
-        fmt::format("frame {}: {} of {} keypoints in dynamic boxes", progress.frame - 1, dynamic.InBoxes(),
-                    progress.result->tracking.keypoints);
+    scene_->captions.back() = fmt::format("frame {}: {} of {} keypoints in dynamic boxes", progress.frame - 1,
+                                          dynamic.InBoxes(), progress.result->tracking.keypoints);
   }
 
  private:
@@ -97,13 +97,14 @@ void PrintTable(const std::vector<DemoScene>& scenes) {
       const auto recall = [with](const DetectionMetrics& metrics) {
         return with ? fmt::format("{:.3f}", metrics.Recall()) : std::string("-");
       };
-      fmt::print("{:<14} {:<10} {:>9} {:>10} {:>14} {:>13} {:>10.1f}\n", scene.name, with ? "with" : "without",
-                 Percent(run.Coverage(), 1), Percent(run.ErrorShare()), recall(run.recall_before),
-                 recall(run.recall_after), run.summary.tracking_ms.median);
+      fmt::print("{:<14} {:<10} {:>9} {:>10} {:>14} {:>13} {:>10.1f}\n", scene.name,
+                 with ? "with" : "without", Percent(run.Coverage(), 1), Percent(run.ErrorShare()),
+                 recall(run.recall_before), recall(run.recall_after), run.summary.tracking_ms.median);
     }
   }
   fmt::print(
-      "coverage: frames with a pose when their turn came. APE: rmse over the length of the path. recall: boxes\n"
+      "coverage: frames with a pose when their turn came. APE: rmse over the length of the path. recall: "
+      "boxes\n"
       "of people and cars found by the detector, and after compensation. ms/frame: median of tracking.\n\n");
 }
 
@@ -125,7 +126,8 @@ void RunDemo(const DemoArguments& arguments, int* exit_code) {
 
 void AddDemoCommand(CLI::App& app, int* exit_code) {
   CLI::App* command = app.add_subcommand(
-      "demo", "Render an office and a street where people and cars move, and run on them with semantics and without");
+      "demo",
+      "Render an office and a street where people and cars move, and run on them with semantics and without");
   const auto arguments = std::make_shared<DemoArguments>();
   DemoArguments& a = *arguments;
   command->add_option("--seed", a.seed, "Another seed is another place with other people");

@@ -18,8 +18,8 @@ struct DemoScene {
   std::vector<std::string> captions;
 };
 
-// All scenes at a glance, CV_8UC3, one below the other: left frames with boxes, mask and keypoints, right both
-// paths over the truth, from above.
+// All scenes at a glance, CV_8UC3, one below the other: left frames with boxes, mask and keypoints, right
+// both paths over the truth, from above.
 cv::Mat DrawDemo(const std::vector<DemoScene>& scenes);
 
 }  // namespace dynamic_slam

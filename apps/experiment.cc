@@ -22,7 +22,8 @@ int64_t Microseconds(double stamp_s) { return std::llround(stamp_s * 1e6); }
 std::vector<BoxRecord> MoversOf(std::vector<BoxRecord> records) {
   const DynamicPrior prior = LoadDynamicPrior("dynamic_prior");
   const double threshold = DynamicScoreOptions().threshold;
-  std::erase_if(records, [&](const BoxRecord& record) { return prior.Score(record.class_name) <= threshold; });
+  std::erase_if(records,
+                [&](const BoxRecord& record) { return prior.Score(record.class_name) <= threshold; });
   return records;
 }
 

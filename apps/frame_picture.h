@@ -7,7 +7,7 @@
 namespace dynamic_slam {
 
 // Of keypoints, BGR: those that hold the pose, those that do so in a dynamic box, those that are not trusted.
-inline const cv::Scalar kHoldingColour(90, 220, 90);      // green
+inline const cv::Scalar kHoldingColour(90, 220, 90);       // green
 inline const cv::Scalar kHoldingInBoxColour(0, 220, 255);  // yellow
 inline const cv::Scalar kUntrustedColour(60, 60, 230);     // red
 

@@ -22,9 +22,8 @@ namespace {
 
 std::function<void(int)> ShowProgress(int frames_total) {
   if (isatty(STDERR_FILENO) == 0) return [](int) {};
-  return [frames_total](int frames) {
-    fmt::print(stderr, "\rrendered {} of {} frames", frames, frames_total);
-  };
+  return
+      [frames_total](int frames) { fmt::print(stderr, "\rrendered {} of {} frames", frames, frames_total); };
 }
 
 void PrintSequence(const std::filesystem::path& folder, const Trajectory& truth, uint64_t seed) {

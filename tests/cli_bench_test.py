@@ -153,7 +153,10 @@ class CliBenchTest(unittest.TestCase):
         self.assertEqual(len(starts), 4)
         self.assertIsNone(starts["fixed", True]["started_s"], "nothing moved but a person")
         self.assertTrue(starts["fixed", True]["good"])
-        self.assertIsNotNone(starts["swaying", True]["started_s"])
+        for semantics in (True, False):
+            sway = starts["swaying", semantics]
+            self.assertEqual(sway["good"], sway["tracks_at_end"] and sway["ape_share"] <= 0.05)
+        self.assertTrue(starts["swaying", False]["tracks_at_end"], "a second of sideways motion is enough")
         self.assertEqual(init["with"], {"good_starts": int(starts["swaying", True]["good"]),
                                         "fixed_without_false_start": 1})
         self.assert_is_picture(out, "init.png")

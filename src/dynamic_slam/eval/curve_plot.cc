@@ -33,7 +33,8 @@ std::string Tick(double value, double step) {
 void DrawCurves(const CurvePlot& plot, const Eigen::Vector2d& top_left, double width_px, double height_px,
                 Canvas* canvas) {
   const Eigen::Vector2d corner = top_left + Eigen::Vector2d(kLeftPx, kTopPx),
-                        size(width_px - kLeftPx - kRightPx, height_px - kTopPx - kBottomPx), end = corner + size;
+                        size(width_px - kLeftPx - kRightPx, height_px - kTopPx - kBottomPx),
+                        end = corner + size;
   const double x_max = Reach(plot, 0, plot.x_max), y_max = Reach(plot, 1, plot.y_max);
   const auto to_px = [&](const Eigen::Vector2d& point) {
     return Eigen::Vector2d(corner.x() + size.x() * point.x() / x_max, end.y() - size.y() * point.y() / y_max);
@@ -49,10 +50,10 @@ void DrawCurves(const CurvePlot& plot, const Eigen::Vector2d& top_left, double w
     const double y_px = to_px({0, i * y_step}).y();
     canvas->Line({corner.x(), y_px}, {end.x(), y_px}, kGridLine, 1);
     canvas->Text(Tick(i * y_step, y_step), {corner.x() - 6, y_px + kTextPx / 2}, kTextPx, kInk,
-                Canvas::Align::kRight);
+                 Canvas::Align::kRight);
   }
   canvas->Text(plot.x_name, {corner.x() + 0.5 * size.x(), end.y() + 32}, kTextPx, kInk,
-              Canvas::Align::kCentre);
+               Canvas::Align::kCentre);
   canvas->Text(plot.y_name, {corner.x(), corner.y() - 8}, kTextPx, kInk);
   for (const CurvePlot::Curve& curve : plot.curves) {
     std::vector<Eigen::Vector2d> points_px;
