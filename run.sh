@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # ./run.sh [SOURCE [options]]: installs what is missing (Debian 12), builds, and runs dynamic_slam on SOURCE; without
-# SOURCE on a room that it renders itself. Options are those of `dynamic_slam run`, such as --camera tum_fr1.
+# SOURCE it shows the demo, on scenes that it renders itself. Options are those of `dynamic_slam run`, such as --camera tum_fr1.
 # Results go to out/ and the name of SOURCE, or to --out.
 set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"

@@ -15,10 +15,6 @@
 namespace dynamic_slam {
 namespace {
 
-// A run that has a pose for less than half of the frames, or is wrong by more than 5% of the path, failed:
-// its error says nothing.
-constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.05;
-
 struct Variant {
   std::string name;
   std::vector<std::string> assignments;

@@ -22,19 +22,25 @@ std::string DetectorFor(std::string name, const std::string& source) {
 
 }  // namespace
 
-void AddBenchOptions(CLI::App* command, const std::string& results, BenchArguments* arguments) {
+void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments* arguments) {
   BenchArguments& a = *arguments;
-  command->add_option("SOURCE", a.sources, "Sequences, as of run")->required();
-  command->add_option("--camera", a.camera, "As of run");
-  command->add_option("--detector", a.detector,
-                      "As of run; {source} in it stands for the sequence: boxes:{source}/boxes.csv");
+  command
+      ->add_option("--detector", a.detector,
+                   "As of run; {source} in it stands for the sequence: boxes:{source}/boxes.csv")
+      ->capture_default_str();
   command->add_option("--models", a.models, "Folder in which network files are looked for too");
   command->add_option("--config", a.config, "YAML file with options");
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
       ->type_name("KEY=VALUE");
-  command->add_option("--out", a.out, fmt::format("Folder for {}", results));
-  AddSourceOptions(command, &a.source_options);
+  command->add_option("--out", a.out, fmt::format("Folder for {}", results))->capture_default_str();
   command->add_flag("--quiet", a.quiet, "No progress");
+}
+
+void AddBenchOptions(CLI::App* command, const std::string& results, BenchArguments* arguments) {
+  command->add_option("SOURCE", arguments->sources, "Sequences, as of run")->required();
+  command->add_option("--camera", arguments->camera, "As of run");
+  AddRunOptions(command, results, arguments);
+  AddSourceOptions(command, &arguments->source_options);
 }
 
 BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_name,
@@ -47,7 +53,11 @@ BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_
   const std::unique_ptr<FrameSource> source = OpenFrameSource(source_name, arguments.source_options);
   BenchRun run;
   run.system = std::make_unique<SlamSystem>(ChooseCamera(arguments.camera, source_name, *source), options);
-  run.system->SetDetector(MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models));
+  if (std::shared_ptr<Detector> detector =
+          MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models)) {
+    run.detector = std::make_shared<RecordingDetector>(std::move(detector));
+  }
+  run.system->SetDetector(run.detector);
   RunControl control = console->Control();
   if (on_frame) {
     control.on_frame = [console, &on_frame](const RunProgress& progress) {
@@ -67,8 +77,7 @@ std::string ShortName(const std::string& source) {
   return path.filename().string();
 }
 
-void WriteRows(const std::filesystem::path& folder, const std::string& name,
-               const nlohmann::ordered_json& rows) {
+void WriteCsv(const std::filesystem::path& file, const nlohmann::ordered_json& rows) {
   std::string csv;
   for (const nlohmann::ordered_json& row : rows) {
     std::string keys, values;
@@ -83,8 +92,17 @@ void WriteRows(const std::filesystem::path& folder, const std::string& name,
     if (csv.empty()) csv = keys + "\n";
     csv += values + "\n";
   }
-  WriteFileAtomically(folder / (name + ".csv"), csv);
-  WriteFileAtomically(folder / (name + ".json"), rows.dump(2) + "\n");
+  WriteFileAtomically(file, csv);
+}
+
+void WriteJson(const std::filesystem::path& file, const nlohmann::ordered_json& json) {
+  WriteFileAtomically(file, json.dump(2) + "\n");
+}
+
+void WriteRows(const std::filesystem::path& folder, const std::string& name,
+               const nlohmann::ordered_json& rows) {
+  WriteCsv(folder / (name + ".csv"), rows);
+  WriteJson(folder / (name + ".json"), rows);
 }
 
 void WriteCurves(const std::filesystem::path& folder, const std::string& name, const CurvePlot& plot) {

@@ -11,6 +11,7 @@
 #include "dynamic_slam/eval/curve_plot.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/sequence_runner.h"
+#include "recording_detector.h"
 #include "run_console.h"
 
 namespace dynamic_slam {
@@ -24,11 +25,19 @@ struct BenchArguments {
   bool quiet = false;
 };
 
-// Adds their options to the command; `results` are the files that --out takes.
+// Adds the options of a run to the command; `results` are the files that --out takes.
+void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments* arguments);
+
+// The same with the sequences.
 void AddBenchOptions(CLI::App* command, const std::string& results, BenchArguments* arguments);
+
+// A run that has a pose for less than half of the frames, or is wrong by more than 5% of the path, failed:
+// its error says nothing.
+inline constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.05;
 
 struct BenchRun {
   std::unique_ptr<SlamSystem> system;
+  std::shared_ptr<RecordingDetector> detector;  // none without one
   RunSummary summary;
 };
 
@@ -40,6 +49,10 @@ BenchRun RunForBench(const BenchArguments& arguments, const std::string& source,
 
 // "street" of "data/street/".
 std::string ShortName(const std::string& source);
+
+// Flat objects with the same keys as rows; null is an empty cell.
+void WriteCsv(const std::filesystem::path& file, const nlohmann::ordered_json& rows);
+void WriteJson(const std::filesystem::path& file, const nlohmann::ordered_json& json);
 
 // The same rows, flat objects with the same keys, as NAME.csv and NAME.json.
 void WriteRows(const std::filesystem::path& folder, const std::string& name,

@@ -5,11 +5,14 @@
 namespace dynamic_slam {
 
 void AddBenchCommand(CLI::App& app, int* exit_code) {
-  CLI::App* bench = app.add_subcommand("bench", "Experiments over sequences");
+  CLI::App* bench = app.add_subcommand("bench", "Experiments over sequences and rendered scenes");
   bench->require_subcommand(1);
   AddAblationCommand(bench, exit_code);
   AddLoopsCommand(bench, exit_code);
   AddScaleCommand(bench, exit_code);
+  AddRecallCommand(bench, exit_code);
+  AddInterferenceCommand(bench, exit_code);
+  AddInitCommand(bench, exit_code);
 }
 
 }  // namespace dynamic_slam

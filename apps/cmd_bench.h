@@ -17,4 +17,11 @@ void AddLoopsCommand(CLI::App* bench, int* exit_code);
 // Adds `bench scale SOURCE...`: what time and memory do in a long sequence.
 void AddScaleCommand(CLI::App* bench, int* exit_code);
 
+// Adds the paper's experiments on rendered scenes: `bench recall`, detections before and after compensation
+// (4.1), `bench interference`, people always in view (4.2), and `bench init`, starts before somebody who
+// moves (4.3).
+void AddRecallCommand(CLI::App* bench, int* exit_code);
+void AddInterferenceCommand(CLI::App* bench, int* exit_code);
+void AddInitCommand(CLI::App* bench, int* exit_code);
+
 }  // namespace dynamic_slam

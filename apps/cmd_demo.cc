@@ -1,82 +1,142 @@
 #include "cmd_demo.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "dynamic_slam/io/frame_source.h"
-#include "dynamic_slam/sim/room.h"
-#include "dynamic_slam/system/sequence_runner.h"
-#include "dynamic_slam/system/slam_system.h"
-#include "overview_picture.h"
-#include "render_room.h"
+#include "demo_picture.h"
+#include "dynamic_slam/io/trajectory_file.h"
+#include "dynamic_slam/sim/simulation.h"
+#include "experiment.h"
+#include "frame_picture.h"
+#include "render_sequence.h"
 #include "run_console.h"
-#include "truth_report.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr const char* kDefaultOut = "out/demo";
+// As TUM's walking_xyz: two people walk before the camera, which sways along all axes. And a block by car.
+constexpr const char* kScenes[] = {"office_walk", "street_short"};
+constexpr int kPicturesOfScene = 4;
 
-struct DemoArguments {
-  std::string out = kDefaultOut;
-  RoomOptions room;
+struct DemoArguments : BenchArguments {
+  std::optional<uint64_t> seed;
+  std::optional<int> frames;
   bool force = false;
 };
 
-void DrawRun(const Room& room, const SlamSystem& system, const TruthComparison& comparison,
-             const std::filesystem::path& out) {
-  const Trajectory estimate = system.FrameTrajectory();
-  const std::string title =
-      fmt::format("Dynamic-SLAM in a rendered room: {} of {} frames have a pose, APE {}", estimate.size(),
-                  room.options().frames, DescribeApe(comparison));
-  const auto image_of = [&room](FrameId frame) { return room.Frame(static_cast<int>(frame.value())); };
-  WritePicture((out / "overview.png").string(),
-               DrawOverview(title, *system.map().Read(), image_of, comparison, estimate));
+// Of each stretch of the run, the frame in which dynamic objects take most of the image.
+class PictureChooser {
+ public:
+  explicit PictureChooser(DemoScene* scene) : scene_(scene) {}
+
+  void Watch(const RunProgress& progress) {
+    const size_t stretch =
+        (progress.frame - 1) * kPicturesOfScene / std::max<size_t>(1, progress.frames_total);
+    double area = 0;
+    for (const DynamicBox& box : progress.result->objects.boxes) area += box.is_dynamic ? box.box.Area() : 0;
+    if (stretch == stretch_ && area <= most_area_ && !scene_->frames.empty()) return;
+    if (stretch != stretch_ || scene_->frames.empty()) {
+      scene_->frames.emplace_back();
+      scene_->captions.emplace_back();
+    }
+    stretch_ = stretch;
+    most_area_ = area;
+    scene_->frames.back() = progress.image->image.clone();
+    DrawFrame(progress, &scene_->frames.back());
+    const DynamicKeypoints& dynamic = progress.result->tracking.dynamic;
+    scene_->captions.back() = fmt::format("frame {}: {} of {} keypoints in dynamic boxes", progress.frame - 1,
+                                          dynamic.InBoxes(), progress.result->tracking.keypoints);
+  }
+
+ private:
+  DemoScene* scene_;
+  size_t stretch_ = 0;
+  double most_area_ = 0;
+};
+
+DemoScene RunScene(const DemoArguments& arguments, const std::string& name, RunConsole* console) {
+  const std::filesystem::path out = std::filesystem::path(arguments.out) / name, sequence = out / "sequence";
+  // The default folder is the demo's own.
+  if (!arguments.force && arguments.out != kDefaultOut) CheckHoldsNoSequence(sequence);
+  SceneOptions options = LoadScene(name);
+  options.seed = arguments.seed.value_or(options.seed);
+  options.frames = std::min(options.frames, arguments.frames.value_or(options.frames));
+  RenderScene(options, sequence);
+  DemoScene scene;
+  scene.name = name;
+  scene.truth = LoadGroundTruth(sequence).value_or(Trajectory());
+  const auto write_to = [](const std::filesystem::path& folder) {
+    return [folder](const SlamSystem& system, const RunSummary& summary) {
+      WriteResults(folder, system, summary);
+    };
+  };
+  PictureChooser chooser(&scene);
+  scene.with = RunExperiment(
+      arguments, sequence.string(), console,
+      [&chooser](const RunProgress& progress) { chooser.Watch(progress); }, write_to(out / "with"));
+  if (console->ShouldStop()) return scene;
+  scene.without =
+      RunExperiment(WithoutSemantics(arguments), sequence.string(), console, {}, write_to(out / "without"));
+  return scene;
+}
+
+void PrintTable(const std::vector<DemoScene>& scenes) {
+  fmt::print("\n{:<14} {:<10} {:>9} {:>10} {:>14} {:>13} {:>10}\n", "scene", "semantics", "coverage",
+             "APE/path", "recall before", "recall after", "ms/frame");
+  for (const DemoScene& scene : scenes) {
+    for (const bool with : {true, false}) {
+      const ExperimentRun& run = with ? scene.with : scene.without;
+      const auto recall = [with](const DetectionMetrics& metrics) {
+        return with ? fmt::format("{:.3f}", metrics.Recall()) : std::string("-");
+      };
+      fmt::print("{:<14} {:<10} {:>9} {:>10} {:>14} {:>13} {:>10.1f}\n", scene.name,
+                 with ? "with" : "without", Percent(run.Coverage(), 1), Percent(run.ErrorShare()),
+                 recall(run.recall_before), recall(run.recall_after), run.summary.tracking_ms.median);
+    }
+  }
+  fmt::print(
+      "coverage: frames with a pose when their turn came. APE: rmse over the length of the path. recall: "
+      "boxes\n"
+      "of people and cars found by the detector, and after compensation. ms/frame: median of tracking.\n\n");
 }
 
 void RunDemo(const DemoArguments& arguments, int* exit_code) {
-  const std::filesystem::path out = arguments.out, sequence = out / "sequence";
-  // The default folder is the demo's own.
-  if (!arguments.force && arguments.out != kDefaultOut) CheckHoldsNoSequence(sequence);
-  const Room room(arguments.room);
-  RenderRoom(room, sequence);
-
-  SlamSystem system(room.options().camera, SystemOptions());
-  RunConsole console(/*quiet=*/false);
-  // From the files: faster than rendering again, and `run` on them gives the same result.
-  const std::unique_ptr<FrameSource> source = OpenFrameSource(sequence);
-  RunSummary summary = RunSequence(*source, system, console.Control());
-  summary.source = sequence.string();
-  console.End();
-  WriteResults(out, system, summary);
-  PrintSummary(summary);
-  const std::optional<TruthComparison> comparison = ReportTruth(sequence, system.FrameTrajectory(), out);
-  if (comparison.has_value()) DrawRun(room, system, *comparison, out);
-  fmt::print("results: {}\nimages:  {}\n", out.string(), sequence.string());
-  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
-  if (summary.interrupted) *exit_code = kExitInterrupted;
+  RunConsole console(arguments.quiet);
+  std::vector<DemoScene> scenes;
+  for (const char* name : kScenes) {
+    if (console.ShouldStop()) break;
+    scenes.push_back(RunScene(arguments, name, &console));
+  }
+  PrintTable(scenes);
+  const std::filesystem::path picture = std::filesystem::path(arguments.out) / "overview.png";
+  WritePicture(picture.string(), DrawDemo(scenes));
+  fmt::print("picture: {}\nresults: {}/SCENE, images in sequence/\n", picture.string(), arguments.out);
+  if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 
 }  // namespace
 
 void AddDemoCommand(CLI::App& app, int* exit_code) {
-  CLI::App* command =
-      app.add_subcommand("demo", "Render a room, find the camera's path in it, and judge the result");
+  CLI::App* command = app.add_subcommand(
+      "demo",
+      "Render an office and a street where people and cars move, and run on them with semantics and without");
   const auto arguments = std::make_shared<DemoArguments>();
   DemoArguments& a = *arguments;
-  command->add_option("--seed", a.room.seed, "Another seed is another room")->capture_default_str();
-  command->add_option("--frames", a.room.frames, "Number of frames")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  command->add_option("--out", a.out, "Folder for the results; the images go into sequence/ in it")
-      ->capture_default_str();
-  command->add_flag("--force", a.force, "Replace a sequence that is in --out");
-  command->footer("overview.png in the results shows the run at a glance.");
+  command->add_option("--seed", a.seed, "Another seed is another place with other people");
+  command->add_option("--frames", a.frames, "Frames of each scene at most")->check(CLI::Range(1, 1000000));
+  a.detector = "builtin";
+  a.out = kDefaultOut;
+  AddRunOptions(command, "the picture and, below the scene's name, images and results", &a);
+  command->add_flag("--force", a.force, "Replace a demo that is in --out");
+  command->footer("overview.png in the results shows both runs at a glance.");
   command->callback([arguments, exit_code] { RunDemo(*arguments, exit_code); });
 }
 

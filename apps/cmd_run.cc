@@ -92,8 +92,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   }
   std::optional<OverlayWriter> overlay;
   if (!arguments.overlay.empty()) {
-    overlay.emplace(arguments.overlay, camera, options.image,
-                    detector == nullptr ? std::vector<std::string>() : detector->class_names());
+    overlay.emplace(arguments.overlay, camera, options.image);
   }
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);

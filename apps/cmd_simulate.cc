@@ -7,15 +7,13 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
-#include "dynamic_slam/eval/pose_list.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/sim/room.h"
-#include "dynamic_slam/sim/simulation_writer.h"
-#include "render_room.h"
+#include "dynamic_slam/sim/simulation.h"
+#include "render_sequence.h"
 
 namespace dynamic_slam {
 namespace {
@@ -53,14 +51,7 @@ void RunSimulate(const SimulateArguments& arguments) {
   options.effects.noise_grey = arguments.noise_grey.value_or(options.effects.noise_grey);
   if (!arguments.camera.empty()) options.camera.model = arguments.camera;
   if (!arguments.force) CheckHoldsNoSequence(arguments.out);
-  const Simulation simulation(options);
-  const bool terminal = isatty(STDERR_FILENO) != 0;
-  WriteSimulation(simulation, arguments.out, arguments.depth, [&](int frames) {
-    if (terminal) fmt::print(stderr, "\rrendered {} of {} frames", frames, options.frames);
-  });
-  if (terminal) fmt::print(stderr, "\n");
-  fmt::print("{}: {} frames, path {:.2f} m, seed {}\n", arguments.out, simulation.truth().size(),
-             PathLength(ToPoseList(simulation.truth())), options.seed);
+  RenderScene(options, arguments.out, arguments.depth);
 }
 
 }  // namespace

@@ -102,6 +102,65 @@ class CliBenchTest(unittest.TestCase):
             self.assertEqual(result.returncode, 2, result.stdout)
             self.assertIn("nowhere", result.stderr)
 
+    def test_recall_counts_before_and_after_compensation(self):
+        # Every other image without an answer: half of the boxes are missed, and compensation brings most back.
+        scene = os.path.join(self.shared, "walk")
+        result = run_program("simulate", "office_walk", "--frames", "12", "--out", scene)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        lines = read(scene, "boxes.csv").splitlines()
+        stamps = sorted({line.split(",")[0] for line in lines[1:]})
+        seen = os.path.join(self.shared, "seen.csv")
+        with open(seen, "w", encoding="utf-8") as file:
+            file.write("\n".join([lines[0]] + [line for line in lines[1:] if line.split(",")[0] in stamps[::2]]) + "\n")
+        out, _ = self.bench("recall", scene, "--detector", "boxes:" + seen)
+        recall = json.loads(read(out, "recall.json"))
+        self.assertEqual(recall["before"]["frames_with_one_found"], 6)
+        self.assertEqual(recall["before"]["frames"], 12)
+        self.assertGreater(recall["after"]["recall_per_box"], recall["before"]["recall_per_box"])
+        rows = [line.split(",") for line in read(out, "recall.csv").splitlines()]
+        self.assertEqual(len(rows), 13)
+        found = rows[0].index("found_before")
+        self.assertEqual([int(row[found]) > 0 for row in rows[1:]], [True, False] * 6)
+        self.assert_is_picture(out, "recall.png")
+
+    def test_recall_needs_true_boxes(self):
+        result = run_program("bench", "recall", self.room, "--max-frames", "2", "--detector", "none", "--out",
+                             os.path.join(self.shared, "none"))
+        self.assertEqual(result.returncode, 2, result)
+        self.assertIn("boxes.csv", result.stderr)
+
+    def test_interference_counts_keypoints_by_the_true_mask(self):
+        out, stdout = self.bench("interference", "--seeds", "1", "--frames", "8", "--detector",
+                                 "boxes:{source}/boxes.csv")
+        runs = json.loads(read(out, "interference.json"))["runs"]
+        self.assertEqual([run["semantics"] for run in runs], [True, False])
+        for run in runs:  # people take most of the view, and without a pose nothing is held
+            self.assertGreater(run["dynamic_share"], 0.3)
+            self.assertLess(run["dynamic_share"], 1)
+        rows = [line.split(",") for line in read(out, "interference_frames.csv").splitlines()]
+        self.assertEqual(len(rows), 9)
+        dynamic, static = rows[0].index("dynamic"), rows[0].index("static")
+        for row in rows[1:]:
+            self.assertGreater(int(row[dynamic]) + int(row[static]), 200)
+        self.assert_is_picture(out, "interference.png")
+        self.assertIn("on people", stdout)
+
+    def test_init_tells_a_fixed_camera_from_one_that_sways(self):
+        out, _ = self.bench("init", "--repetitions", "1", "--fixed", "1", "--frames", "35", "--detector",
+                            "boxes:{source}/boxes.csv")
+        init = json.loads(read(out, "init.json"))
+        starts = {(start["camera"], start["semantics"]): start for start in init["starts"]}
+        self.assertEqual(len(starts), 4)
+        self.assertIsNone(starts["fixed", True]["started_s"], "nothing moved but a person")
+        self.assertTrue(starts["fixed", True]["good"])
+        for semantics in (True, False):
+            sway = starts["swaying", semantics]
+            self.assertEqual(sway["good"], sway["tracks_at_end"] and sway["ape_share"] <= 0.05)
+        self.assertTrue(starts["swaying", False]["tracks_at_end"], "a second of sideways motion is enough")
+        self.assertEqual(init["with"], {"good_starts": int(starts["swaying", True]["good"]),
+                                        "fixed_without_false_start": 1})
+        self.assert_is_picture(out, "init.png")
+
 
 if __name__ == "__main__":
     PROGRAM = os.path.abspath(sys.argv.pop(1))

@@ -312,13 +312,18 @@ class CliRunTest(unittest.TestCase):
 
     def test_demo(self):
         out = os.path.join(self.folder, "a")
-        arguments = ["demo", "--frames", "40", "--seed", "2", "--out", out]
+        arguments = ["demo", "--frames", "25", "--seed", "2", "--detector", "boxes:{source}/boxes.csv", "--out", out,
+                     "--quiet"]
         result = run_program(*arguments)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertRegex(result.stdout, r"rmse .* m \(.*% of the path of ")
-        self.assertEqual(sorted(os.listdir(out)), sorted(RESULTS + ["overview.png", "sequence"]))
-        self.assertEqual(sorted(os.listdir(os.path.join(out, "sequence"))),
-                         ["camera.yaml", "groundtruth.txt", "rgb", "rgb.txt"])
+        for scene in ("office_walk", "street_short"):
+            rows = [line.split() for line in result.stdout.splitlines() if line.startswith(scene)]
+            self.assertEqual([row[1] for row in rows], ["with", "without"])
+            self.assertEqual([rows[0][4], rows[1][4]], ["1.000", "-"], "the true boxes miss nobody")
+            self.assertEqual(sorted(os.listdir(os.path.join(out, scene))), ["sequence", "with", "without"])
+            for run in ("with", "without"):
+                self.assertLessEqual(set(RESULTS) - {"trajectory.png"}, set(os.listdir(os.path.join(out, scene, run))))
+        self.assertIn("overview.png", os.listdir(out))
         result = run_program(*arguments)
         self.assertEqual(result.returncode, 2, "must not replace a sequence unasked")
         self.assertIn("--force", result.stderr)

@@ -92,13 +92,33 @@ std::vector<PlanarPath> WalksBefore(const World& world, int count) {
   return walks;
 }
 
+// Ways along the line of sight, side by side: from where somebody fills the height of the image to where the
+// desks begin.
+std::vector<PlanarPath> WalksTowards(const World& world, int count) {
+  const Eigen::Vector2d centre = world.camera_centre.head<2>();
+  const Eigen::Vector2d sight = (world.camera_target - world.camera_centre).head<2>();
+  const Eigen::Vector2d ahead = sight.normalized(), left(-ahead.y(), ahead.x());
+  std::vector<PlanarPath> walks;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector2d shift = 0.9 * (i - 0.5 * (count - 1)) * left;
+    walks.push_back(PlanarPath::ToAndFro(centre + 1.3 * ahead + shift,
+                                         centre + std::max(2.0, sight.norm() - 1.2) * ahead + shift, 0.4));
+  }
+  return walks;
+}
+
+std::vector<PlanarPath> WalksOf(const PeopleOptions& people, const World& world) {
+  if (people.towards_camera) return WalksTowards(world, people.count);
+  if (people.near_camera) return WalksBefore(world, (people.count + 3) / 4);
+  return world.walks;
+}
+
 }  // namespace
 
 std::vector<std::unique_ptr<Actor>> MakeActors(const SceneOptions& options, World& world) {
   std::vector<std::unique_ptr<Actor>> actors;
   Random random(SubSeed(options.seed, 2));
-  const std::vector<PlanarPath> walks =
-      options.people.near_camera ? WalksBefore(world, (options.people.count + 3) / 4) : world.walks;
+  const std::vector<PlanarPath> walks = WalksOf(options.people, world);
   for (int i = 0; i < options.people.count && !walks.empty(); ++i) {
     const PlanarPath& walk = walks[static_cast<size_t>(i) % walks.size()];
     // Those who share a path keep their distance: they start apart and walk equally fast.

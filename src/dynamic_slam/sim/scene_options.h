@@ -31,6 +31,7 @@ struct WorldOptions {
 struct PeopleOptions {
   int count = 2;
   bool near_camera = false;
+  bool towards_camera = false;
   double speed_m_per_s = 1.1;
 
   template <class Self, class Visitor>
@@ -38,6 +39,8 @@ struct PeopleOptions {
     visit("count", self.count, OptionField{"", 0, 200, "People who walk."});
     visit("near_camera", self.near_camera,
           OptionField{"", 0, 0, "They walk to and fro right before the camera, always in view."});
+    visit("towards_camera", self.towards_camera,
+          OptionField{"", 0, 0, "They come towards the camera and go away again; before near_camera."});
     visit("speed_m_per_s", self.speed_m_per_s, OptionField{"m/s", 0, 3, "Mean speed; each has its own."});
   }
 };

@@ -115,7 +115,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
       log.Add(image->timestamp_s, result);
       if (control.on_frame)
         control.on_frame(
-            {summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map()});
+            {summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map(), system.detector()});
     }
     end_feed();
     if (summary.interrupted) system.Stop();

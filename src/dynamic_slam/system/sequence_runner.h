@@ -16,6 +16,7 @@ struct RunProgress {
   const FrameResult* result = nullptr;
   const Frame* frame_in_work = nullptr;  // keypoints and what became of them
   const SharedMap* map = nullptr;
+  const Detector* detector = nullptr;  // that named the objects of the result; none without one
 };
 
 // What a run asks and tells while it goes on; each may be empty.

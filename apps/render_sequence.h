@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "dynamic_slam/sim/room.h"
+#include "dynamic_slam/sim/scene_options.h"
 
 namespace dynamic_slam {
 
@@ -11,5 +12,8 @@ void CheckHoldsNoSequence(const std::filesystem::path& folder);
 
 // Writes the room as a sequence in TUM layout, with progress on a terminal, and prints one line about it.
 void RenderRoom(const Room& room, const std::filesystem::path& folder);
+
+// The same of a scene with all its truth (sim/simulation_writer.h); a sequence that is there is replaced.
+void RenderScene(const SceneOptions& options, const std::filesystem::path& folder, bool with_depth = false);
 
 }  // namespace dynamic_slam
