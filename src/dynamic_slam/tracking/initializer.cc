@@ -151,12 +151,14 @@ void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches)
 
 TwoViewOptions Initializer::Limits(const Frame& frame) const {
   TwoViewOptions limits = options_.two_view;
-  const bool has_movers = std::any_of(frame.static_probability.begin(), frame.static_probability.end(),
-                                      [](float p) { return p < kMinStaticProbability; });
-  if (has_movers) {
-    limits.min_parallax_deg = std::max(limits.min_parallax_deg, options_.movers_min_parallax_deg);
-    limits.min_points = std::max(limits.min_points, options_.movers_min_points);
-  }
+  const auto movers = std::count_if(frame.static_probability.begin(), frame.static_probability.end(),
+                                    [](float p) { return p < kMinStaticProbability; });
+  const double share = static_cast<double>(movers) / static_cast<double>(frame.features.size());
+  // Half of a view is enough to hide what tells two motions apart.
+  const double full = std::min(2 * share, 1.0);
+  const auto raise = [full](double from, double to) { return from + full * std::max(to - from, 0.0); };
+  limits.min_parallax_deg = raise(limits.min_parallax_deg, options_.movers_min_parallax_deg);
+  limits.min_points = static_cast<int>(raise(limits.min_points, options_.movers_min_points));
   return limits;
 }
 

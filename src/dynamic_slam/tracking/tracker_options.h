@@ -38,8 +38,8 @@ struct InitializerOptions {
                       "Of two motions that fit, the errors of the better over those of the other, at most."});
     visit("movers_min_parallax_deg", self.movers_min_parallax_deg,
           OptionField{"deg", 0, 20,
-                      "The parallax of two_view, where something moves in the image: what is left of what is "
-                      "at rest tells less of which motion it was."});
+                      "The parallax of two_view where half of the keypoints or more are on movers, in between "
+                      "as far as they are: what is left tells less of which motion it was."});
     visit("movers_min_points", self.movers_min_points,
           OptionField{"", 8, 5000, "The points of two_view there."});
     visit("two_view", self.two_view);
