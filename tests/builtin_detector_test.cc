@@ -62,11 +62,12 @@ class BuiltinDetectorSceneTest : public testing::Test {
   const std::unique_ptr<Detector> detector_ = MakeDetector("builtin");
 };
 
-TEST_F(BuiltinDetectorSceneTest, FindsThePeopleInAnOffice) {
-  const DetectionMetrics people = Compare(Scene("office", 104), "person");
-  ASSERT_GE(people.hits + people.misses, 4u);
-  EXPECT_GE(people.Recall(), 0.8);
-  EXPECT_GE(people.Precision(), 0.8);
+// The goal is more (docs/builtin_detector.md); this is what must not be lost.
+TEST_F(BuiltinDetectorSceneTest, FindsThePeopleOfACrowd) {
+  const DetectionMetrics people = Compare(Scene("crowd", 104), "person");
+  ASSERT_GE(people.hits + people.misses, 12u);
+  EXPECT_GE(people.Recall(), 0.7);
+  EXPECT_GE(people.Precision(), 0.5);
 }
 
 TEST_F(BuiltinDetectorSceneTest, SeesNobodyWhereNobodyIs) {
