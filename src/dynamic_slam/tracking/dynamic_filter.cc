@@ -148,7 +148,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   std::vector<uint8_t> in_box(n, 0);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
-    const double at_rest = AtRestByBoxes(frame->features.keypoints[i], &is_inside);
+    const double at_rest = AtRestByBoxes(frame->features.keypoints[i], weights, &is_inside);
     in_box[i] = is_inside ? 1 : 0;
     if (weights) {
       prior_[i] = static_cast<float>(std::min(at_rest, 1 - options_.missed_object));
@@ -171,15 +171,14 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
 
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other.
-double DynamicFilter::AtRestByBoxes(const Keypoint& keypoint, bool* in_box) const {
-  const bool weights = options_.method == "weights";
+double DynamicFilter::AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const {
   const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
   for (const Object& object : objects_) {
     if (!object.IsMoving()) continue;
     const Box& b = object.box.box;
-    const double margin_px = weights ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
+    const double margin_px = with_margin ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
     if (!b.Contains(keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
     belongs_to_none *= 1 - options_.object_share;
     sum_moves += object.moves;

@@ -75,7 +75,7 @@ class DynamicFilter {
 
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
-  double AtRestByBoxes(const Keypoint& keypoint, bool* in_box) const;
+  double AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const;
   std::vector<Mover> FindMovers(const KeypointFlow& flow) const;
   void WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth);
 
