@@ -1,7 +1,6 @@
 #include "dynamic_slam/sim/mesh_renderer.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -11,6 +10,7 @@
 
 #include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/sim/color_materials.h"
+#include "dynamic_slam/sim/fast_log2.h"
 
 namespace dynamic_slam {
 
@@ -60,14 +60,6 @@ DS_DISPATCH_AVX2 void CoverRow(const float* __restrict m, const float* __restric
     best[i] = wins ? z : best[i];
     best_id[i] = wins ? id : best_id[i];
   }
-}
-
-// log2 to 0.01, for x >= 1: the exponent and a parabola through the mantissa.
-float FastLog2(float x) {
-  const uint32_t bits = std::bit_cast<uint32_t>(x);
-  const float mantissa = std::bit_cast<float>((bits & 0x007fffffu) | 0x3f800000u);
-  return static_cast<float>(static_cast<int>(bits >> 23) - 128) + mantissa * (2.0f - mantissa / 3.0f) -
-         2.0f / 3.0f;
 }
 
 float Dot(const Eigen::RowVector3f& row, float x, float y) { return row[0] * x + row[1] * y + row[2]; }

@@ -1,11 +1,12 @@
 #include "dynamic_slam/sim/renderer.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include <Eigen/LU>
+
+#include "dynamic_slam/sim/fast_log2.h"
 
 namespace dynamic_slam {
 
@@ -64,14 +65,6 @@ void UpdateNearest(const Eigen::Matrix3f& m, int id, int count, const float* __r
     best[i] = wins ? c : best[i];
     best_id[i] = wins ? id : best_id[i];
   }
-}
-
-// log2 to 0.01, for x >= 1: the exponent and a parabola through the mantissa.
-float FastLog2(float x) {
-  const uint32_t bits = std::bit_cast<uint32_t>(x);
-  const float mantissa = std::bit_cast<float>((bits & 0x007fffffu) | 0x3f800000u);
-  return static_cast<float>(static_cast<int>(bits >> 23) - 128) + mantissa * (2.0f - mantissa / 3.0f) -
-         2.0f / 3.0f;
 }
 
 }  // namespace
