@@ -12,6 +12,7 @@ struct DetectionOptions {
   int every = 1;
   double deadline_ms = 5;
   double latency_ms = 0;
+  double first_answer_s = 2;
   CompensationOptions compensation;
   std::string prior = "dynamic_prior";
   DynamicScoreOptions score;
@@ -27,6 +28,10 @@ struct DetectionOptions {
     visit("latency_ms", self.latency_ms,
           OptionField{"ms", 0, 60000,
                       "Answers are kept back until the stamps are so much later: a simulated slow network."});
+    visit("first_answer_s", self.first_answer_s,
+          OptionField{"s", 0, 600,
+                      "No map is started before the detector has answered once, for so long at most: a start "
+                      "that cannot know who moves is often a wrong one."});
     visit("compensation", self.compensation);
     visit("prior", self.prior,
           OptionField{"", 0, 0, "File, or name of one in the configuration, with the scores of classes."});

@@ -112,7 +112,14 @@ FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
     objects.reason = failure_;
   }
   objects.boxes = score_.Update(compensation_->Update(input));
+  objects.is_awaited = IsFirstAnswerAwaited(timestamp_s);
   return objects;
+}
+
+bool DetectionStage::IsFirstAnswerAwaited(double timestamp_s) {
+  if (!first_stamp_s_.has_value()) first_stamp_s_ = timestamp_s;
+  const bool has_answered = report_.on_time + report_.late + report_.failed > 0;
+  return !has_answered && timestamp_s - *first_stamp_s_ < options_.first_answer_s;
 }
 
 void DetectionStage::SetRotation(FrameId frame, const Eigen::Quaterniond& cam_from_last) {
@@ -126,6 +133,7 @@ void DetectionStage::Reset() {
   open_.reset();
   answer_.reset();
   failure_.clear();
+  first_stamp_s_.reset();
   report_ = DetectionReport();
 }
 

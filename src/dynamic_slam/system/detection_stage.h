@@ -35,6 +35,7 @@ struct FrameObjects {
   DetectionState state = DetectionState::kOff;
   std::string reason;  // of a failure
   std::vector<DynamicBox> boxes;
+  bool is_awaited = false;  // the detector has not answered even once, and it is not too late to hope for it
 };
 
 // What the detector has done so far.
@@ -90,6 +91,8 @@ class DetectionStage {
   // answer.
   std::optional<DetectionResult> TakeAnswer(double timestamp_s, double patience_ms);
 
+  bool IsFirstAnswerAwaited(double timestamp_s);
+
   std::shared_ptr<Detector> detector_;
   DetectionOptions options_;
   Executor* executor_;
@@ -99,6 +102,7 @@ class DetectionStage {
   std::optional<Question> open_;
   std::optional<DetectionResult> answer_;  // that came before it was due
   std::string failure_;                    // of an answer taken in this frame
+  std::optional<double> first_stamp_s_;
   DetectionReport report_;
 };
 

@@ -98,6 +98,25 @@ TEST_F(DetectionStageTest, BetweenTheFramesThatAreAskedAboutBoxesAreCompensated)
   EXPECT_EQ(stage_->report().asked, 10);
 }
 
+TEST_F(DetectionStageTest, TheFirstAnswerIsAwaitedForALimitedTime) {
+  DetectionOptions options;
+  options.latency_ms = 90;
+  Make([](FrameId frame) { return std::vector<Detection>{Walker(frame)}; }, options);
+  for (uint32_t i = 0; i < 10; ++i) EXPECT_EQ(Process(i).is_awaited, i < 3) << i;
+  stage_->Reset();
+  EXPECT_TRUE(Process(0).is_awaited);
+
+  options.latency_ms = 60000;
+  options.first_answer_s = 0.5;
+  Make([](FrameId) { return std::vector<Detection>{}; }, options);
+  for (uint32_t i = 0; i < 30; ++i) EXPECT_EQ(Process(i).is_awaited, i < 0.5 * kFps) << i;
+}
+
+TEST_F(DetectionStageTest, AFailureIsAnAnswer) {
+  Make([](FrameId) -> std::vector<Detection> { throw std::runtime_error("no memory"); });
+  EXPECT_FALSE(Process(0).is_awaited);
+}
+
 TEST_F(DetectionStageTest, ASlowNetworkIsLateAndStillOfUse) {
   DetectionOptions options;
   options.latency_ms = 90;  // between two and three frames

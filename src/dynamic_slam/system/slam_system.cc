@@ -65,7 +65,8 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
     result.objects =
         detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation(), tracker_.Motions());
   }
-  result.tracking = tracker_.Track(result.objects.boxes, executor_->Waiting(Lane::kMapping));
+  result.tracking =
+      tracker_.Track(result.objects.boxes, executor_->Waiting(Lane::kMapping), result.objects.is_awaited);
   if (const auto rotation = tracker_.Rotation(); rotation.has_value() && detection_.has_value()) {
     detection_->SetRotation(result.id, *rotation);
   }

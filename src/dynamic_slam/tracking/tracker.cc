@@ -80,7 +80,8 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
 }
 
-TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting) {
+TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting,
+                              bool objects_awaited) {
   DS_TRACE("tracking");
   inliers_ = 0;
   reason_.clear();
@@ -98,6 +99,8 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
     if (state_ == TrackingState::kTracking && !result.part_was_erased) {
       InsertKeyframeIfDue(keyframes_waiting, &result);
     }
+  } else if (state_ == TrackingState::kInitialising && objects_awaited) {
+    reason_ = "initialising: waiting for the detector's first answer";
   } else if (state_ == TrackingState::kInitialising) {
     Initialise(&result);
   } else {

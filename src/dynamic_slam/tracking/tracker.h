@@ -79,8 +79,9 @@ class Tracker {
   const std::vector<PointMotion>& Motions() const { return flow_.motions(); }
 
   // Finds the pose of the frame. objects: what is in it. keyframes_waiting: those that local mapping has not
-  // come to yet.
-  TrackingResult Track(std::span<const DynamicBox> objects = {}, int keyframes_waiting = 0);
+  // come to yet. objects_awaited: what is in the view is not known yet, and no map is started meanwhile.
+  TrackingResult Track(std::span<const DynamicBox> objects = {}, int keyframes_waiting = 0,
+                       bool objects_awaited = false);
 
   // The rotation that was found; none without a pose in this frame or the last.
   std::optional<Eigen::Quaterniond> Rotation() const;
