@@ -32,6 +32,11 @@ struct Frame {
     return static_probability.empty() ? 1.0f : static_probability[keypoint];
   }
 
+  // Whether the keypoint is not to be used, or was seen to move: a box alone is not enough for that.
+  bool MovesForSure(size_t keypoint) const {
+    return StaticProbability(keypoint) <= 0 || (!motion_log_odds.empty() && motion_log_odds[keypoint] < 0);
+  }
+
   void ClearLandmarks() {
     landmarks.assign(features.size(), LandmarkId());
     points.resize(features.size());

@@ -10,6 +10,7 @@
 #include "dynamic_slam/map/static_evidence.h"
 #include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/semantics/selective_tracking.h"
+#include "dynamic_slam/tracking/rest_flow.h"
 
 namespace dynamic_slam {
 namespace {
@@ -151,7 +152,8 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     const double at_rest = AtRestByBoxes(frame->features.keypoints[i], weights, &is_inside);
     in_box[i] = is_inside ? 1 : 0;
     if (weights) {
-      prior_[i] = static_cast<float>(std::min(at_rest, 1 - options_.missed_object));
+      // However many boxes overlap, motion can still overrule them.
+      prior_[i] = static_cast<float>(std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object));
       if (const uint32_t from = flow.last_keypoints()[i]; options_.motion && from != KeypointFlow::kNone) {
         frame->motion_log_odds[i] = last.motion_log_odds[from];
       }
@@ -256,47 +258,89 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
   const std::vector<Mover> movers = FindMovers(flow);
   if (movers.empty()) return;
   const Rigid3 frame_from_last = frame->cam_from_world * last.cam_from_world.Inverse();
-  const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
   const double nearest_depth = kNearestDepthRatio * median_depth;
   for (const Mover& mover : movers) WatchObject(mover, frame_from_last, nearest_depth);
   const Eigen::Matrix3d rotation = frame_from_last.Matrix();
+  // At rest, it lies on the epipolar line between where infinity and the nearest depth go.
+  const auto rest = [&](const Eigen::Vector2d& before_px) -> std::optional<RestPlace> {
+    const Eigen::Vector3d far = rotation * camera_.Unproject(before_px);
+    const Eigen::Vector3d near = nearest_depth * far + frame_from_last.translation;
+    if (far.z() <= 0 || near.z() <= 0) return std::nullopt;
+    return RestPlace{camera_.Project(far), camera_.Project(near)};
+  };
+  WatchKeypoints(rest, movers, flow, last, frame);
+}
+
+void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last, Frame* frame) {
+  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
+  DS_TRACE("tracking/watch");
+  const std::vector<Mover> movers = FindMovers(flow);
+  if (movers.empty()) return;
+  std::vector<PointMotion> outside;
+  for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
+    const uint32_t from = flow.last_keypoints()[i];
+    if (from == KeypointFlow::kNone || frame->static_probability[i] < kMinStaticProbability ||
+        last.StaticProbability(from) < kMinStaticProbability) {
+      continue;
+    }
+    const Keypoint &before = last.features.keypoints[from], &now = frame->features.keypoints[i];
+    outside.push_back({{before.x, before.y}, {now.x, now.y}});
+  }
+  const std::optional<RestFlow> flow_at_rest = RestFlow::Fit(outside);
+  if (!flow_at_rest.has_value()) return;
+  const auto rest = [&](const Eigen::Vector2d& before_px) -> std::optional<RestPlace> {
+    const Eigen::Vector2d px = flow_at_rest->Move(before_px);
+    return RestPlace{px, px, flow_at_rest->Variance(before_px)};
+  };
+  WatchKeypoints(rest, movers, flow, last, frame);
+}
+
+template <class Rest>
+void DynamicFilter::WatchKeypoints(const Rest& rest, std::span<const Mover> movers, const KeypointFlow& flow,
+                                   const Frame& last, Frame* frame) const {
+  const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
     if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
     const Keypoint& before = last.features.keypoints[flow.last_keypoints()[i]];
     const Keypoint& now = frame->features.keypoints[i];
     const Eigen::Vector2d px(now.x, now.y), before_px(before.x, before.y);
-    // At rest, it lies on the epipolar line between where infinity and the nearest depth go.
-    const Eigen::Vector3d ray = camera_.Unproject(before_px);
-    const Eigen::Vector3d far = rotation * ray;
-    const Eigen::Vector3d near = nearest_depth * far + frame_from_last.translation;
-    if (far.z() <= 0 || near.z() <= 0) continue;
-    const Eigen::Vector2d far_px = camera_.Project(far), near_px = camera_.Project(near);
+    const std::optional<RestPlace> place = rest(before_px);
+    if (!place.has_value()) continue;
     // Noise of both ends.
-    const double sigma_px =
+    const double noise_px =
         std::numbers::sqrt2 * octave_scales_[static_cast<size_t>(std::max(now.octave, before.octave))];
-    const double rest_error_px = DistanceToSegment(px, far_px, near_px);
-    const double length_px = (near_px - far_px).norm();
+    const double sigma_px = std::sqrt(Square(noise_px) + place->variance_px2);
+    const double rest_error_px = DistanceToSegment(px, place->far_px, place->near_px);
+    const double length_px = (place->near_px - place->far_px).norm();
     const double log_rest = -0.5 * Square(rest_error_px / sigma_px) -
                             std::log(2 * std::numbers::pi * sigma_px * sigma_px) -
                             std::log1p(length_px / (std::sqrt(2 * std::numbers::pi) * sigma_px));
-    double evidence = 0;
+    const double rest_density = std::exp(log_rest) + mismatch;
+    // It belongs to any of the objects about it, each as likely as the other: that it does not move as one
+    // who walks tells little where another stands.
+    double sum_density = 0;
+    int objects = 0;
     for (const Mover& mover : movers) {
       const double ring_px = KeypointFlow::kReach * std::sqrt(mover.to.Area());
       if (!mover.to.Contains(now.raw_x, now.raw_y, ring_px)) continue;
+      ++objects;
       const Eigen::Vector2d center(mover.from.CenterX(), mover.from.CenterY());
       const Eigen::Vector2d raw_before(before.raw_x, before.raw_y);
       const Eigen::Vector2d moved_px =
           before_px + mover.motion.shift_px + (mover.motion.scale - 1) * (raw_before - center);
-      const double apart_px = DistanceToSegment(moved_px, far_px, near_px);
+      const double apart_px = DistanceToSegment(moved_px, place->far_px, place->near_px);
+      if (apart_px < kApart * sigma_px) {
+        // Who moves as what is at rest does gives no evidence: people stand still for a while.
+        sum_density += rest_density;
+        continue;
+      }
       // Limbs swing to and fro beside the body.
       const double mover_sigma_px = std::max(sigma_px, kLimbs * apart_px);
-      // Who moves as what is at rest does gives no evidence: people stand still for a while.
-      if (apart_px < kApart * sigma_px) continue;
-      const double log_moves = -0.5 * Square((px - moved_px).norm() / mover_sigma_px) -
-                               std::log(2 * std::numbers::pi * mover_sigma_px * mover_sigma_px);
-      const double ratio = std::log(std::exp(log_rest) + mismatch) - std::log(std::exp(log_moves) + mismatch);
-      evidence = std::abs(ratio) > std::abs(evidence) ? ratio : evidence;
+      const double density = std::exp(-0.5 * Square((px - moved_px).norm() / mover_sigma_px)) /
+                             (2 * std::numbers::pi * mover_sigma_px * mover_sigma_px);
+      sum_density += density + mismatch;
     }
+    const double evidence = objects == 0 ? 0 : std::log(rest_density * objects / sum_density);
     float& odds = frame->motion_log_odds[i];
     odds = std::clamp(odds + static_cast<float>(std::clamp(evidence, -kMostEvidence, kMostEvidence)),
                       -kMaxStaticLogOdds, kMaxStaticLogOdds);

@@ -36,6 +36,9 @@ class DynamicFilter {
   // the object. Changes frame->static_probability.
   void Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame);
 
+  // The same while no pose is known: what is at rest moves as the keypoints outside the boxes do.
+  void WatchBeforePose(const KeypointFlow& flow, const Frame& last, Frame* frame);
+
   // The boxes of the last Judge that are to be watched: of dynamic objects, and of those like a parked car
   // whose class is dynamic and which do not move.
   std::vector<Box> Boxes() const;
@@ -73,10 +76,20 @@ class DynamicFilter {
     BoxMotion motion;
   };
 
+  // Where a point at rest is in this frame: on the segment, by its depth, ideal px.
+  struct RestPlace {
+    Eigen::Vector2d far_px, near_px;
+    double variance_px2 = 0;  // beside that of the keypoints
+  };
+
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
   double AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const;
   std::vector<Mover> FindMovers(const KeypointFlow& flow) const;
+  // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
+  template <class Rest>
+  void WatchKeypoints(const Rest& rest, std::span<const Mover> movers, const KeypointFlow& flow,
+                      const Frame& last, Frame* frame) const;
   void WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth);
 
   Camera camera_;

@@ -227,6 +227,50 @@ TEST_F(DynamicFilterTest, MotionTellsThePersonFromTheWallBehind) {
   EXPECT_GT(frame_.static_probability.front(), 0.9);
 }
 
+TEST_F(DynamicFilterTest, BeforeAPoseMotionTellsThePersonFromTheWallTooByWhatIsOutside) {
+  DynamicFilter filter = Make("weights");
+  flow_.Clear(last_);
+  filter.Judge(std::vector{Person(0)}, flow_, frame_, &last_);
+  flow_.Match(last_, filter.Boxes(), {}, frame_);
+  filter.Judge(std::vector{Person(kPersonPx)}, flow_, last_, &frame_);
+  filter.WatchBeforePose(flow_, last_, &frame_);
+  EXPECT_GT(MeanInBox(false), kMinStaticProbability);
+  EXPECT_LT(MeanInBox(true), 0.1);
+}
+
+TEST_F(DynamicFilterTest, WhoStandsStillBesideAnotherWhoWalksIsNotTakenForTheWall) {
+  DynamicFilter filter = Make("weights");
+  DynamicBox stands_before = Person(0), stands_now = Person(-camera_.fx * kShift / kDepth);
+  stands_before.track_id = stands_now.track_id = 2;
+  flow_.Clear(last_);
+  filter.Judge(std::vector{Person(0), stands_before}, flow_, frame_, &last_);
+  flow_.Match(last_, filter.Boxes(), {}, frame_);
+  filter.Judge(std::vector{Person(kPersonPx), stands_now}, flow_, last_, &frame_);
+  filter.Watch(flow_, last_, kDepth, &frame_);
+  EXPECT_LT(MeanInBox(false), kMinStaticProbability) << "the wall, or who stands before it";
+  EXPECT_LT(MeanInBox(true), 0.1);
+}
+
+TEST_F(DynamicFilterTest, HoweverManyBoxesOverlapMotionOverrulesThem) {
+  DynamicFilter filter = Make("weights");
+  std::vector<DynamicBox> before, now;
+  for (int id = 1; id <= 4; ++id) {
+    before.push_back(Person(0));
+    now.push_back(Person(kPersonPx));
+    before.back().track_id = now.back().track_id = id;
+  }
+  for (int i = 0; i < 4; ++i) {
+    flow_.Clear(last_);
+    filter.Judge(before, flow_, frame_, &last_);
+    last_.motion_log_odds = i == 0 ? std::vector<float>(last_.features.size(), 0.0f) : frame_.motion_log_odds;
+    flow_.Match(last_, filter.Boxes(), {}, frame_);
+    filter.Judge(now, flow_, last_, &frame_);
+    filter.Watch(flow_, last_, kDepth, &frame_);
+  }
+  EXPECT_GT(MeanInBox(false), kMinStaticProbability);
+  EXPECT_LT(MeanInBox(true), 0.1);
+}
+
 TEST_F(DynamicFilterTest, WithoutMotionAllInTheBoxIsDoubted) {
   DynamicOptions options;
   options.motion = false;

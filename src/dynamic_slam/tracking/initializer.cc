@@ -64,7 +64,7 @@ std::vector<Match> Initializer::MatchWithReference(const Frame& frame) {
   for (size_t i = 0; i < moves.size(); ++i) moves[i] = frame.StaticProbability(i) < kMinStaticProbability;
   for (uint32_t i = 0; i < first.size(); ++i) {
     const int octave = first.keypoints[i].octave;
-    if (octave > options_.max_octave || reference_->StaticProbability(i) < kMinStaticProbability) continue;
+    if (octave > options_.max_octave || reference_->MovesForSure(i)) continue;
     const SearchWindow window{last_places_[i].x(), last_places_[i].y(),
                               static_cast<float>(options_.search_radius_px), std::max(0, octave - 1),
                               std::min(octave + 1, options_.max_octave)};

@@ -93,6 +93,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
   TrackingResult result;
   result.dynamic = judged;
   result.keypoints = static_cast<int>(frame_.features.size());
+  if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
   if ((last_has_pose_ && TrackFrame()) || Relocalise()) {
     AcceptPose();
     if (!start_is_certain_) ReviewStart(&result);
