@@ -37,9 +37,11 @@ void Landmark::Transform(const Sim3& new_from_old) {
   max_distance_ *= static_cast<float>(new_from_old.scale);
 }
 
-void Map::Reset() {
+void Map::Reset() { Replace(Map(octave_scales_)); }
+
+void Map::Replace(Map other) {
   const uint32_t epoch = epoch_, revision = revision_;
-  *this = Map(std::move(octave_scales_));
+  *this = std::move(other);
   epoch_ = epoch + 1;
   revision_ = revision + 1;
 }

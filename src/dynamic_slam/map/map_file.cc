@@ -252,6 +252,7 @@ void TakeLandmark(double max_pairs, Reader* in, Map* map, double* pairs) {
   landmark.visible_count = static_cast<int>(visible);
   landmark.found_count = static_cast<int>(found);
   landmark.static_log_odds = static_log_odds;
+  landmark.is_from_file = true;
   for (const Observation& observation : observations) {
     map->Link(observation.keyframe, observation.keypoint, landmark.id());
   }

@@ -10,7 +10,7 @@
 namespace dynamic_slam {
 
 // A map between runs, and the camera in whose ideal pixels its keypoints are. Its keyframes are of no frame
-// of any run: Keyframe::frame_id is not valid.
+// of this run: Keyframe::frame_id is not valid, and Landmark::is_from_file says the same.
 struct SavedMap {
   Camera camera;
   Map map;
