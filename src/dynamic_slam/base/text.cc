@@ -137,9 +137,11 @@ std::string ReadFile(const std::filesystem::path& file, const std::string& remed
     throw InputError(file.string(), fmt::format("cannot be read ({})", std::strerror(errno)), remedy);
   }
   std::string content;
-  constexpr size_t kBlock = 1 << 16;
+  // At once, where the size is known.
+  const uintmax_t announced = std::filesystem::file_size(file, ignored);
+  const size_t block = ignored ? 1 << 16 : std::max<size_t>(announced + 1, 1 << 16);
   for (size_t size = 0; stream;) {
-    content.resize(size + std::max(kBlock, size));
+    content.resize(size + block);
     stream.read(content.data() + size, static_cast<std::streamsize>(content.size() - size));
     size += static_cast<size_t>(stream.gcount());
     content.resize(size);

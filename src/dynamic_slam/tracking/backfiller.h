@@ -19,7 +19,7 @@ namespace dynamic_slam {
 
 // Gives frames that had no pose when their turn came one in the finished map, which knows more: from where
 // the frames before and after them are, or else from what they look like. A pose needs as many inliers as it
-// did then.
+// did then, and must be one to which the camera can have moved from those before and after it.
 class Backfiller {
  public:
   Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);
@@ -58,6 +58,10 @@ class Backfiller {
     Rigid3 cam_from_world;
   };
 
+  // How fast the camera was, and how often there are frames.
+  void LearnMotion(const Known& known);
+  // Whether the camera can have come there from the pose before, and from there to the pose after.
+  bool IsPlausible(const Known& known, const AnchoredPose& pose) const;
   std::optional<AnchoredPose> FindPose(const Known& known, KeptFrame* kept);
   std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
   // Adds where the camera is at the stamp if it went on as between the two poses, and where it was at the
@@ -73,6 +77,8 @@ class Backfiller {
   Random random_;
   std::deque<KeptFrame> kept_;  // in the order of time
   size_t keypoints_ = 0;        // of all of them
+  double max_gap_s_ = 0;
+  std::map<PartId, double> max_speed_;  // map units per s
 };
 
 }  // namespace dynamic_slam
