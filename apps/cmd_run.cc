@@ -16,6 +16,7 @@
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
 #include "mask_folder.h"
@@ -38,6 +39,8 @@ struct RunArguments {
   std::string trace;
   std::string models;
   std::string overlay, masks, export_masks;
+  std::string save_map, load_map;
+  bool localise_only = false, no_backfill = false;
   std::optional<double> detector_latency_ms;
   FrameSourceOptions source_options;
   bool quiet = false;
@@ -60,6 +63,17 @@ void EndTrace(const std::string& file) {
   fmt::print("trace: {} ({} events{})\n", file, trace.events, dropped);
 }
 
+// What the options say of maps between runs.
+void CheckMapOptions(const RunArguments& arguments, const SystemOptions& options) {
+  if (!options.tracker.localise_only) return;
+  if (arguments.load_map.empty()) {
+    throw InputError("--localise-only", "there is no map to localise in", "Give one with --load-map FILE.");
+  }
+  if (!arguments.save_map.empty()) {
+    throw InputError("--save-map", "the map does not change with --localise-only", "Leave one of them out.");
+  }
+}
+
 void RunSource(const RunArguments& arguments, int* exit_code) {
   TraceThreadName("main");
   if (!arguments.trace.empty()) StartTrace();
@@ -67,17 +81,22 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
   ApplySet(&options, arguments.assignments);
   if (arguments.detector_latency_ms) options.detector.latency_ms = *arguments.detector_latency_ms;
+  options.tracker.localise_only |= arguments.localise_only;
+  options.backfill &= !arguments.no_backfill;
+  CheckMapOptions(arguments, options);
   const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   const Camera camera = ChooseCamera(arguments.camera, arguments.source, *source);
   const std::filesystem::path out = OutputFolder(arguments);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
   system.SetDetector(detector);
+  if (!arguments.load_map.empty()) system.LoadMap(ReadMapFile(arguments.load_map), arguments.load_map);
   if (!arguments.masks.empty() && !std::filesystem::is_directory(arguments.masks)) {
     throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
   }
   PrepareOutputFolder(out);
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
+  if (!arguments.save_map.empty()) CheckCanBeWritten(arguments.save_map);
   RunConsole console(arguments.quiet);
   RunControl control = console.Control();
   std::optional<MaskFolder> masks;
@@ -105,9 +124,13 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   WriteResults(out, system, summary);
+  if (!arguments.save_map.empty() && summary.failure == nullptr) {
+    WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
+  }
   PrintSummary(summary);
   ReportTruth(arguments.source, system.FrameTrajectory(), out);
   if (!arguments.trace.empty()) EndTrace(arguments.trace);
+  if (!arguments.save_map.empty() && summary.failure == nullptr) fmt::print("map: {}\n", arguments.save_map);
   fmt::print("results: {}\n", out.string());
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
@@ -148,6 +171,13 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->check(CLI::IsMember({"offline", "realtime"}))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
+  command->add_option("--save-map", a.save_map, "File for the map, for later runs and `dynamic_slam map`");
+  command->add_option("--load-map", a.load_map,
+                      "Map of an earlier run with the same camera: it is looked for first, and grows");
+  command->add_flag("--localise-only", a.localise_only,
+                    "Only poses in the map of --load-map, which stays as it is");
+  command->add_flag("--no-backfill", a.no_backfill,
+                    "Frames that had no pose when their turn came do not get one in the finished map");
   command->add_option("--trace", a.trace,
                       "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
   AddSourceOptions(command, &a.source_options);

@@ -10,6 +10,7 @@
 #include "cmd_demo.h"
 #include "cmd_detect.h"
 #include "cmd_eval.h"
+#include "cmd_map.h"
 #include "cmd_models.h"
 #include "cmd_run.h"
 #include "cmd_simulate.h"
@@ -31,6 +32,7 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddRunCommand(app, &exit_code);
   dynamic_slam::AddEvalCommand(app);
   dynamic_slam::AddDetectCommand(app, &exit_code);
+  dynamic_slam::AddMapCommand(app);
   dynamic_slam::AddModelsCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);

@@ -183,7 +183,10 @@ TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
 
 TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {
   const Room room = MakeRoom(60);
-  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 12), BlackFrames(20)), Frames(room, 30, 60)));
+  ImageSource source(Join(Join(Frames(room, 0, 12), BlackFrames(20)), Frames(room, 30, 60)));
+  SystemOptions options;
+  options.backfill = false;  // else they are found in the second map
+  const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
   const RunSummary& summary = run.summary;
   EXPECT_EQ(summary.reset_count, 1);
   const auto reset = std::find_if(summary.frames.begin(), summary.frames.end(), [](const auto& frame) {

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
 
@@ -134,29 +136,58 @@ std::string ReadFile(const std::filesystem::path& file, const std::string& remed
   if (!stream) {
     throw InputError(file.string(), fmt::format("cannot be read ({})", std::strerror(errno)), remedy);
   }
-  std::string content{std::istreambuf_iterator<char>(stream), {}};
+  std::string content;
+  // At once, where the size is known.
+  const uintmax_t announced = std::filesystem::file_size(file, ignored);
+  const size_t block = ignored ? 1 << 16 : std::max<size_t>(announced + 1, 1 << 16);
+  for (size_t size = 0; stream;) {
+    content.resize(size + block);
+    stream.read(content.data() + size, static_cast<std::streamsize>(content.size() - size));
+    size += static_cast<size_t>(stream.gcount());
+    content.resize(size);
+  }
   if (stream.bad()) throw InputError(file.string(), "reading failed", remedy);
   return content;
 }
 
 namespace {
 
-// Writes FILE.tmp, whose path it returns.
+bool WriteAll(int descriptor, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = write(descriptor, content.data(), content.size());
+    if (written < 0 && errno != EINTR) return false;
+    if (written > 0) content.remove_prefix(static_cast<size_t>(written));
+  }
+  return true;
+}
+
+// Writes FILE.tmp to the disk, and returns its path.
 std::filesystem::path WriteTemporary(const std::filesystem::path& file, std::string_view content) {
   std::error_code error;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
   std::filesystem::path temporary = file;
   temporary += ".tmp";
-  errno = 0;
-  std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-  stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-  stream.close();
-  if (!stream) {
-    const std::string reason = fmt::format("cannot be written ({})", std::strerror(errno));
+  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  bool done = descriptor >= 0 && WriteAll(descriptor, content) && fsync(descriptor) == 0;
+  int reason = errno;
+  if (descriptor >= 0 && close(descriptor) != 0 && done) {
+    done = false;
+    reason = errno;
+  }
+  if (!done) {
     std::filesystem::remove(temporary, error);
-    throw InputError(file.string(), reason, "Choose a folder that can be written and has space left.");
+    throw InputError(file.string(), fmt::format("cannot be written ({})", std::strerror(reason)),
+                     "Choose a folder that can be written and has space left.");
   }
   return temporary;
+}
+
+// So that a rename outlives a power cut; where a folder cannot be synced, the system does it in its time.
+void SyncFolder(const std::filesystem::path& folder) {
+  const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  fsync(descriptor);
+  close(descriptor);
 }
 
 }  // namespace
@@ -170,6 +201,7 @@ void WriteFileAtomically(const std::filesystem::path& file, std::string_view con
     std::filesystem::remove(temporary, error);
     throw InputError(file.string(), reason, "Choose another name.");
   }
+  SyncFolder(file.parent_path());
 }
 
 void CheckCanBeWritten(const std::filesystem::path& file) {

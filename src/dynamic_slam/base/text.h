@@ -46,8 +46,8 @@ std::vector<TextLine> ReadDataLines(const std::filesystem::path& file);
 // message.
 std::string ReadFile(const std::filesystem::path& file, const std::string& remedy = "");
 
-// Writes FILE.tmp and renames it to FILE, so that FILE is never half written; makes the folder. Throws
-// InputError.
+// Writes FILE.tmp to the disk and renames it to FILE, so that FILE is never half written, whenever the program
+// or the machine stops; makes the folder. Throws InputError.
 void WriteFileAtomically(const std::filesystem::path& file, std::string_view content);
 
 // Throws InputError when WriteFileAtomically would, as far as that can be known before; makes the folder.

@@ -44,6 +44,13 @@ struct Frame {
   }
 };
 
+// Where a camera was, relative to a keyframe: outlives whatever happens to the map.
+struct AnchoredPose {
+  double timestamp_s = 0;
+  KeyframeId reference;
+  Rigid3 cam_from_reference;  // lengths are in the reference's unit (Keyframe::unit)
+};
+
 class Map;
 
 // Makes the frame a keyframe that sees the frame's landmarks, in a part of the map.

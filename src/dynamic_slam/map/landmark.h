@@ -49,6 +49,8 @@ class Landmark {
   // Log of P(at rest) / P(moves), from all frames that matched it (tracking/dynamic_filter.h).
   float static_log_odds = 0;
 
+  bool is_from_file = false;  // and not seen to be made in this run
+
   double FoundRatio() const { return static_cast<double>(found_count) / visible_count; }
 
  private:

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/base/error.h"
 
 namespace dynamic_slam {
@@ -23,6 +24,38 @@ Sim3 OwnFromWorld(const Keyframe& keyframe) {
   return {1 / keyframe.unit(), cam_from_world.rotation, cam_from_world.translation / keyframe.unit()};
 }
 
+// The distances of all pairs: row i has those of i.
+DS_DISPATCH_POPCNT
+void AllDistances(const std::vector<const Descriptor*>& descriptors, std::vector<uint16_t>* distances) {
+  const size_t count = descriptors.size();
+  distances->assign(count * count, 0);
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      (*distances)[i * count + j] = (*distances)[j * count + i] =
+          static_cast<uint16_t>(HammingDistance(*descriptors[i], *descriptors[j]));
+    }
+  }
+}
+
+// The descriptor with the least median distance to the others.
+size_t Medoid(const std::vector<const Descriptor*>& descriptors) {
+  const size_t count = descriptors.size();
+  std::vector<uint16_t> distances;
+  AllDistances(descriptors, &distances);
+  size_t best = 0;
+  int best_median = std::numeric_limits<int>::max();
+  for (size_t i = 0; i < count; ++i) {
+    const auto row = distances.begin() + static_cast<std::ptrdiff_t>(i * count);
+    const auto middle = row + static_cast<std::ptrdiff_t>((count - 1) / 2);
+    std::nth_element(row, middle, row + static_cast<std::ptrdiff_t>(count));
+    if (*middle < best_median) {
+      best_median = *middle;
+      best = i;
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 bool Landmark::IsSeenBy(KeyframeId keyframe) const {
@@ -37,9 +70,11 @@ void Landmark::Transform(const Sim3& new_from_old) {
   max_distance_ *= static_cast<float>(new_from_old.scale);
 }
 
-void Map::Reset() {
+void Map::Reset() { Replace(Map(octave_scales_)); }
+
+void Map::Replace(Map other) {
   const uint32_t epoch = epoch_, revision = revision_;
-  *this = Map(std::move(octave_scales_));
+  *this = std::move(other);
   epoch_ = epoch + 1;
   revision_ = revision + 1;
 }
@@ -219,20 +254,7 @@ void Map::RefreshLandmark(LandmarkId id) {
   landmark.max_distance_ = static_cast<float>(std::exp(log_distance_sum / static_cast<double>(count)));
   landmark.min_distance_ = landmark.max_distance_ / octave_scales_.back();
 
-  // The medoid: the descriptor with the least median distance to the others.
-  size_t best = 0;
-  int best_median = std::numeric_limits<int>::max();
-  std::vector<int> distances(count);
-  for (size_t i = 0; i < count && count > 2; ++i) {
-    for (size_t j = 0; j < count; ++j) distances[j] = HammingDistance(*descriptors[i], *descriptors[j]);
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>((count - 1) / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    if (*middle < best_median) {
-      best_median = *middle;
-      best = i;
-    }
-  }
-  landmark.descriptor_ = *descriptors[count > 2 ? best : count - 1];
+  landmark.descriptor_ = *descriptors[count > 2 ? Medoid(descriptors) : count - 1];
 }
 
 Map::Anchor Map::ResolveKeyframe(KeyframeId id) const {

@@ -28,6 +28,8 @@ class Map {
   // Empties the map. Ids start again from 0, so that those of before mean nothing any more: whoever keeps ids
   // while the map is unlocked compares the epoch, which changes with ErasePart too.
   void Reset();
+  // Becomes another map, as after Reset.
+  void Replace(Map other);
   uint32_t epoch() const { return epoch_; }
 
   // Counts up when poses and points change all at once, for a loop or in the adjustment of everything: what

@@ -35,7 +35,10 @@ MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
     result.bundle = AdjustLocal(camera_, options_, keyframe, epoch_, should_stop, map_);
     return true;
   };
-  const bool done = Change([&](Map* map) { CullRecentLandmarks(keyframe, map, &result); }) &&
+  const bool done = Change([&](Map* map) {
+                      CullRecentLandmarks(keyframe, map, &result);
+                      CullMovedLandmarks(keyframe, map, &result);
+                    }) &&
                     CreateLandmarks(keyframe, &result) && FuseLandmarks(keyframe, &result) && adjust() &&
                     CullRedundantKeyframes(keyframe, &result);
   result.abandoned = !done;
@@ -62,6 +65,24 @@ void LocalMapper::CullRecentLandmarks(KeyframeId current, Map* map, MappingResul
     }
   }
   recent_landmarks_.resize(kept);
+}
+
+void LocalMapper::CullMovedLandmarks(KeyframeId current, Map* map, MappingResult* result) {
+  std::vector<LandmarkId> moved;
+  const auto neighbours =
+      map->keyframes().At(current).BestCovisible(static_cast<size_t>(options_.fusion_neighbours));
+  for (const CovisibleKeyframe& neighbour : neighbours) {
+    for (const LandmarkId id : map->keyframes().At(neighbour.id).landmarks()) {
+      if (!id.IsValid()) continue;
+      const Landmark& landmark = map->landmarks().At(id);
+      if (landmark.is_from_file && landmark.FoundRatio() < kMinFoundRatio) moved.push_back(id);
+    }
+  }
+  for (const LandmarkId id : moved) {
+    if (!map->landmarks().Contains(id)) continue;
+    map->EraseLandmark(id);
+    ++result->culled_landmarks;
+  }
 }
 
 bool LocalMapper::CreateLandmarks(KeyframeId current, MappingResult* result) {

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/map/landmark_fusion.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/landmark_factory.h"
-#include "dynamic_slam/map/landmark_fusion.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 
@@ -58,6 +58,9 @@ class LocalMapper {
   bool CreateLandmarks(KeyframeId current, MappingResult* result);
   bool FuseLandmarks(KeyframeId current, MappingResult* result);
   bool CullRedundantKeyframes(KeyframeId current, MappingResult* result);
+  // Landmarks from a file, near the keyframe, that have moved since the visit in which they were made: they
+  // are not found any more where they should be.
+  void CullMovedLandmarks(KeyframeId current, Map* map, MappingResult* result);
   void CullRecentLandmarks(KeyframeId current, Map* map, MappingResult* result);
   bool IsRedundant(const Map& map, const Keyframe& keyframe) const;
 

@@ -234,5 +234,26 @@ TEST(LocalMapperTest, ALandmarkThatTrackingDoesNotFindIsCulled) {
   EXPECT_THAT(map.Validate(), IsEmpty());
 }
 
+// Of a map that was loaded: what is not found where it should be has moved since.
+TEST(LocalMapperTest, LandmarksThatMovedBetweenVisitsFade) {
+  TwoKeyframes two(0.5);
+  Map& map = two.scene.map;
+  std::vector<LandmarkId> moved, still_there, own;
+  map.landmarks().ForEach([&](Landmark& landmark) {
+    const uint32_t kind = landmark.id().value() % 3;
+    landmark.visible_count = 20;
+    landmark.found_count = kind == 1 ? 10 : 2;
+    landmark.is_from_file = kind != 2;
+    (kind == 0 ? moved : kind == 1 ? still_there : own).push_back(landmark.id());
+  });
+  ASSERT_GT(moved.size(), 10u);
+  LocalMapper mapper(two.world.camera(), {}, &two.scene.shared_map);
+  mapper.Process(two.second, map.epoch());
+  for (const LandmarkId id : moved) EXPECT_FALSE(map.landmarks().Contains(id));
+  for (const LandmarkId id : still_there) EXPECT_TRUE(map.Resolve(id).IsValid());
+  for (const LandmarkId id : own) EXPECT_TRUE(map.Resolve(id).IsValid());
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
 }  // namespace
 }  // namespace dynamic_slam

@@ -25,7 +25,7 @@ struct RunSummary {
   uint64_t seed = 0;
   size_t frames_total = 0;       // images that the source announced, unreadable and dropped ones included
   size_t frames_tracked = 0;     // live: with a pose when their turn came, in the map that was kept
-  size_t frames_backfilled = 0;  // given one later: those before the start of which the map was made
+  size_t frames_backfilled = 0;  // given one later: of the map's start, or in the finished map
   size_t frames_dropped = 0;     // realtime: came while tracking was late
   size_t keyframes = 0, landmarks = 0;
   size_t maps = 0;                       // parts of the map that nothing ties together

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "dynamic_slam/base/error.h"
@@ -15,6 +17,14 @@ namespace {
 
 double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Whether keypoints are where they would be with the other one.
+bool IsSameCamera(const Camera& a, const Camera& b) {
+  const auto numbers = [](const Camera& c) {
+    return std::tuple(c.width, c.height, c.model, c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4);
+  };
+  return numbers(a) == numbers(b);
 }
 
 const SystemOptions& Checked(const SystemOptions& options) {
@@ -39,7 +49,11 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       tracker_(camera(), options.orb, options.tracker, options.dynamic, options.seed, &map_),
       mapper_(camera(), options.mapper, &map_),
       loop_closer_(camera(), options.loop, options.seed, &map_),
-      executor_(std::move(executor)) {}
+      executor_(std::move(executor)) {
+  if (mode_ == RunMode::kOffline && options_.backfill) {
+    backfiller_.emplace(camera(), options_.tracker, options_.seed, &map_);
+  }
+}
 
 // Tasks ask the executor what waits, so none may run any more when it goes.
 SlamSystem::~SlamSystem() { executor_->Cancel(); }
@@ -72,17 +86,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   }
   result.tracking_ms = MillisecondsSince(start) - asking_ms;
 
-  if (result.tracking.part_was_erased) {
-    const auto map = map_.Read();
-    std::erase_if(tracked_, [&](const TrackedFrame& f) { return !map->PartOf(f.reference).IsValid(); });
-  }
-  if (result.tracking.state == TrackingState::kTracking) {
-    const Frame& frame = tracker_.frame();
-    for (const EarlierFrame& earlier : result.tracking.earlier_frames) {
-      tracked_.push_back({earlier.timestamp_s, earlier.reference, earlier.cam_from_reference, false});
-    }
-    tracked_.push_back({timestamp_s, frame.reference, frame.cam_from_reference, true});
-  }
+  Remember(result);
   for (const KeyframeId keyframe : result.tracking.new_keyframes) {
     executor_->Post(Lane::kMapping,
                     [this, keyframe, epoch = result.tracking.map_epoch](const std::stop_token& token) {
@@ -93,6 +97,29 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   result.keyframes_waiting = executor_->Waiting(Lane::kMapping);
   TraceCounter("keyframes waiting", result.keyframes_waiting);
   return result;
+}
+
+void SlamSystem::Remember(const FrameResult& result) {
+  const TrackingResult& tracking = result.tracking;
+  const Frame& frame = tracker_.frame();
+  if (tracking.part_was_erased) {
+    const auto map = map_.Read();
+    std::erase_if(tracked_, [&](const TrackedFrame& f) { return !map->PartOf(f.pose.reference).IsValid(); });
+    if (backfiller_.has_value()) backfiller_->PartWasErased();
+  }
+  const bool has_pose = tracking.state == TrackingState::kTracking;
+  if (has_pose) {
+    if (options_.backfill) {
+      for (const AnchoredPose& earlier : tracking.earlier_frames) tracked_.push_back({earlier, false});
+    }
+    tracked_.push_back({{frame.timestamp_s, frame.reference, frame.cam_from_reference}, true});
+  }
+  if (!backfiller_.has_value()) return;
+  if (!has_pose || tracking.may_be_erased) {
+    backfiller_->Keep(frame, tracking.min_inliers, has_pose);
+  } else {
+    backfiller_->ForgetPosed();
+  }
 }
 
 void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token) {
@@ -144,7 +171,19 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   executor_->Drain(Lane::kMapping);
   PostLoops();
   executor_->Drain(Lane::kLoop);
-  return options_.final_bundle ? mapper_.Finish(should_stop) : BundleSummary();
+  const bool adjusts = options_.final_bundle && !options_.tracker.localise_only;
+  const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
+  if (backfiller_.has_value()) Backfill(should_stop);
+  return bundle;
+}
+
+void SlamSystem::Backfill(const std::function<bool()>& should_stop) {
+  std::vector<AnchoredPose> known;
+  for (const TrackedFrame& frame : tracked_) known.push_back(frame.pose);
+  for (const AnchoredPose& pose : backfiller_->Find(known, should_stop)) tracked_.push_back({pose, false});
+  std::stable_sort(tracked_.begin(), tracked_.end(), [](const TrackedFrame& a, const TrackedFrame& b) {
+    return a.pose.timestamp_s < b.pose.timestamp_s;
+  });
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
@@ -153,6 +192,27 @@ void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
   if (detector != nullptr) {
     detection_.emplace(std::move(detector), options_.detector, camera(), executor_.get());
   }
+}
+
+void SlamSystem::LoadMap(SavedMap saved, const std::string& name) {
+  DS_CHECK(frame_count_ == 0, "frames={}", frame_count_);
+  if (!IsSameCamera(saved.camera, camera())) {
+    throw InputError(name, fmt::format("was made with another camera ('{}')", saved.camera.name),
+                     "Give the --camera and the options image.* of the run that saved it.");
+  }
+  if (saved.map.octave_scales() != OctaveScales(options_.orb)) {
+    throw InputError(name, "was made with other octaves",
+                     "Give orb.levels and orb.scale_factor of the run that saved it.");
+  }
+  saved.map.landmarks().ForEach([](Landmark& landmark) {
+    // Many sightings of an earlier visit say no more of this one than a few.
+    constexpr int kMaxSightings = 10;
+    if (landmark.visible_count <= kMaxSightings) return;
+    landmark.found_count = static_cast<int>(std::lround(kMaxSightings * landmark.FoundRatio()));
+    landmark.visible_count = kMaxSightings;
+  });
+  map_.Write()->Replace(std::move(saved.map));
+  tracker_.ExpectKnownPlace();
 }
 
 void SlamSystem::Stop() {
@@ -165,6 +225,7 @@ void SlamSystem::Reset() {
   tracker_.Reset();
   if (detection_.has_value()) detection_->Reset();
   tracked_.clear();
+  if (backfiller_.has_value()) backfiller_->Clear();
   *mapping_report_.Write() = MappingReport();
   *loop_report_.Write() = LoopReport();
   mapped_.Write()->clear();
@@ -176,7 +237,8 @@ std::vector<PartId> SlamSystem::Parts() const {
   const auto map = map_.Read();
   std::vector<PartId> parts = map->Parts();
   std::map<PartId, size_t> frames;
-  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.reference)];
+  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.pose.reference)];
+  std::erase_if(parts, [&](PartId part) { return frames[part] == 0; });
   std::stable_sort(parts.begin(), parts.end(), [&](PartId a, PartId b) { return frames[a] > frames[b]; });
   return parts;
 }
@@ -193,9 +255,10 @@ Trajectory SlamSystem::FrameTrajectory(PartId part) const {
   trajectory.reserve(tracked_.size());
   const auto map = map_.Read();
   for (const TrackedFrame& frame : tracked_) {
-    if (map->PartOf(frame.reference) != part) continue;
+    const AnchoredPose& pose = frame.pose;
+    if (map->PartOf(pose.reference) != part) continue;
     trajectory.push_back(
-        {frame.timestamp_s, map->PoseFromReference(frame.reference, frame.cam_from_reference).Inverse()});
+        {pose.timestamp_s, map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse()});
   }
   return trajectory;
 }
@@ -204,7 +267,7 @@ size_t SlamSystem::LiveFrameCount() const {
   const PartId part = OrMain({});
   const auto map = map_.Read();
   return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(), [&](const TrackedFrame& frame) {
-    return frame.is_live && map->PartOf(frame.reference) == part;
+    return frame.is_live && map->PartOf(frame.pose.reference) == part;
   }));
 }
 
@@ -212,7 +275,7 @@ Trajectory SlamSystem::KeyframeTrajectory(PartId part) const {
   part = OrMain(part);
   Trajectory trajectory;
   map_.Read()->keyframes().ForEach([&](const Keyframe& keyframe) {
-    if (keyframe.part() != part) return;
+    if (keyframe.part() != part || !keyframe.frame_id().IsValid()) return;
     trajectory.push_back({keyframe.timestamp_s(), keyframe.cam_from_world().Inverse()});
   });
   return trajectory;

@@ -12,11 +12,13 @@
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
 #include "dynamic_slam/loop/loop_closer.h"
+#include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/local_mapper.h"
 #include "dynamic_slam/system/detection_stage.h"
 #include "dynamic_slam/system/executor.h"
 #include "dynamic_slam/system/system_options.h"
+#include "dynamic_slam/tracking/backfiller.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
@@ -73,14 +75,18 @@ class SlamSystem {
   // called before the first image.
   void SetDetector(std::shared_ptr<Detector> detector);
 
+  // The camera is looked for in this map first. `name` is that of its file, for messages. To be called before
+  // the first image. Throws InputError when it was made with another camera or other octaves.
+  void LoadMap(SavedMap saved, const std::string& name);
+
   // image: of the raw camera's size, any type that ImagePreparer takes. mask: empty, or CV_8UC1 of camera()'s
   // size, not 0 where keypoints are forbidden, beside those of the static mask. Throws InputError, and
   // changes nothing, when the image cannot be prepared.
   FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
-  // To be called after the last image: waits for the stages, then adjusts the whole map. Poses and landmarks
-  // are final after it. `should_stop` may be empty; when it says so, the adjustment ends with what it has.
-  // Does nothing after Stop().
+  // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
+  // poses of frames that have none yet. Poses and landmarks are final after it. `should_stop` may be empty;
+  // when it says so, the adjustment ends with what it has. Does nothing after Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -90,13 +96,14 @@ class SlamSystem {
   // Forgets all images and the map.
   void Reset();
 
-  // Parts of the map, each with a world and a unit of length of its own: the one with the most frames first.
-  // More than one where tracking was lost, started anew, and saw nothing since that it knew before.
+  // Parts of the map with frames, each with a world and a unit of length of its own: the one with the most
+  // frames first. More than one where tracking was lost, started anew, and saw nothing since that it knew
+  // before.
   std::vector<PartId> Parts() const;
 
   // The frames that have a pose in the part, the main one unless it is said, at where the map puts them now.
   Trajectory FrameTrajectory(PartId part = {}) const;
-  Trajectory KeyframeTrajectory(PartId part = {}) const;
+  Trajectory KeyframeTrajectory(PartId part = {}) const;  // without those of a map that was loaded
 
   // Frames of FrameTrajectory that had their pose when their turn came.
   size_t LiveFrameCount() const;
@@ -116,11 +123,8 @@ class SlamSystem {
   const SystemOptions& options() const { return options_; }
 
  private:
-  // Where a frame was, relative to a keyframe: survives whatever happens to the map.
   struct TrackedFrame {
-    double timestamp_s;
-    KeyframeId reference;
-    Rigid3 cam_from_reference;
+    AnchoredPose pose;
     bool is_live;  // not given its pose by a later frame
   };
 
@@ -130,6 +134,8 @@ class SlamSystem {
   };
 
   PartId OrMain(PartId part) const;
+  void Remember(const FrameResult& result);
+  void Backfill(const std::function<bool()>& should_stop);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   // Looks for loops at the keyframes that local mapping has done since the last call.
   void PostLoops();
@@ -146,7 +152,8 @@ class SlamSystem {
   Guarded<LoopReport> loop_report_;
   Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
-  std::vector<TrackedFrame> tracked_;
+  std::vector<TrackedFrame> tracked_;     // in the order of time
+  std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   uint32_t frame_count_ = 0;
   cv::Mat grey_;  // the image in work
   bool is_stopped_ = false;

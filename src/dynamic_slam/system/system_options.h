@@ -16,6 +16,7 @@ namespace dynamic_slam {
 struct SystemOptions {
   uint64_t seed = 1;
   bool final_bundle = true;
+  bool backfill = true;
   ImageOptions image;
   DetectionOptions detector;
   OrbOptions orb;
@@ -30,6 +31,11 @@ struct SystemOptions {
           OptionField{"", 0, 0, "Seed of everything random: the same seed gives the same bytes."});
     visit("final_bundle", self.final_bundle,
           OptionField{"", 0, 1, "Adjust the whole map once more when the sequence is over."});
+    visit("backfill", self.backfill,
+          OptionField{
+              "", 0, 1,
+              "Offline: frames that had no pose when their turn came get one in the finished map, where "
+              "they fit it."});
     visit("image", self.image);
     visit("detector", self.detector);
     visit("dynamic", self.dynamic);

@@ -198,7 +198,7 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
   return InitialProposal{std::move(best), {}, is_certain};
 }
 
-std::vector<EarlierFrame> Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
+std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
   const InitialStructure& structure = proposal.structure;
   const std::vector<Match>& matches = proposal.matches;
   std::vector<double> depths;
@@ -230,7 +230,7 @@ std::vector<EarlierFrame> Initializer::BuildMap(const InitialProposal& proposal,
   frame->reference = second_id;
   frame->cam_from_reference = Rigid3();
 
-  std::vector<EarlierFrame> earlier{{reference_->timestamp_s, first_id, Rigid3()}};
+  std::vector<AnchoredPose> earlier{{reference_->timestamp_s, first_id, Rigid3()}};
   for (size_t i = 0; i < views_.between.size(); ++i) {
     if (!structure.between_from_reference[i].has_value()) continue;
     Rigid3 pose = *structure.between_from_reference[i];

@@ -15,13 +15,6 @@
 
 namespace dynamic_slam {
 
-// A frame that gets its pose when a later one makes the map.
-struct EarlierFrame {
-  double timestamp_s = 0;
-  KeyframeId reference;
-  Rigid3 cam_from_reference;
-};
-
 // Two views of which a first map can be made.
 struct InitialProposal {
   InitialStructure structure;
@@ -43,7 +36,7 @@ class Initializer {
   // Gives the map a new part of two keyframes and their landmarks (median depth 1 in the first), and the
   // frame, which is the one of the proposal, its pose, landmarks and reference.
   // The frames before it that have a pose now, in the order of time.
-  std::vector<EarlierFrame> BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
+  std::vector<AnchoredPose> BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
 
   // The frame with which all are matched; not valid before the first.
   FrameId reference() const { return reference_.has_value() ? reference_->id : FrameId(); }

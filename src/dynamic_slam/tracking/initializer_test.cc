@@ -32,7 +32,7 @@ class InitializerTest : public ::testing::Test {
   Random random_{1};
   Map map_{SyntheticWorld::OctaveScales()};
   std::vector<SyntheticView> views_;
-  std::vector<EarlierFrame> earlier_;
+  std::vector<AnchoredPose> earlier_;
 };
 
 TEST_F(InitializerTest, MakesAMapThatIsTrueUpToScale) {

@@ -12,11 +12,6 @@ namespace {
 // When the motion model fails the camera may have jerked: look this much farther once more.
 constexpr double kWideSearch = 3.0;
 
-// A pose that comes from descriptors alone is less exact than a prediction.
-constexpr double kRelocalisedSearch = 3.0;
-
-constexpr int kLocalMapPasses = 2;
-
 // A motion is not carried on for longer than so many times the time in which it was seen.
 constexpr double kMaxPredictionSteps = 5;
 
@@ -54,7 +49,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       bounds_(camera.IdealBounds()),
       extractor_(orb, camera),
       initializer_(camera, options.initializer, octave_scales_),
-      pose_tracker_(camera, options, octave_scales_),
+      localiser_(camera, options, octave_scales_, map),
       filter_(camera, dynamic, octave_scales_),
       flow_(camera, octave_scales_),
       seed_(seed),
@@ -111,6 +106,13 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
     StartAnewWhenLostForLong(&result);
   }
   last_has_pose_ = state_ == TrackingState::kTracking;
+  if (start_is_young_ && last_has_pose_) {
+    const PartId part = PartOfFrame();
+    start_is_young_ =
+        part == start_part_ && (!start_is_certain_ || KeyframesIn(part) <= options_.small_map_keyframes);
+  }
+  result.may_be_erased = start_is_young_;
+  result.min_inliers = MinInliers();
   result.state = state_;
   result.inliers = inliers_;
   result.reason = reason_;
@@ -125,10 +127,7 @@ void Tracker::AcceptPose() {
   state_ = TrackingState::kTracking;
   lost_frames_ = 0;
   CountVisibility();
-  frame_.reference = view_.reference;
-  frame_.cam_from_reference = frame_.cam_from_world * view_.reference_from_world.Inverse();
-  frame_.cam_from_reference.translation /= view_.reference_unit;
-  frame_.reference_unit = view_.reference_unit;
+  localiser_.Anchor(&frame_);
   velocity_.reset();
   if (!last_has_pose_) return;
   velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
@@ -158,6 +157,7 @@ void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) 
     });
     inliers_ = map->keyframes().At(frame_.reference).LandmarkCount();
   }
+  start_is_young_ = true;
   start_is_certain_ = proposal.is_certain;
   if (start_is_certain_) initializer_.Reset();
   state_ = TrackingState::kTracking;
@@ -195,6 +195,12 @@ void Tracker::ReviewStart(TrackingResult* result) {
   initializer_.Reset();
 }
 
+int Tracker::KeyframesIn(PartId part) const {
+  int keyframes = 0;
+  map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) { keyframes += keyframe.part() == part; });
+  return keyframes;
+}
+
 PartId Tracker::PartOfFrame() const { return map_->Read()->PartOf(frame_.reference); }
 
 void Tracker::ErasePart(TrackingResult* result) {
@@ -209,6 +215,7 @@ void Tracker::ForgetPose() {
   visibility_.Clear();
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
+  start_is_young_ = false;
   last_has_pose_ = false;
   velocity_.reset();
   lost_frames_ = 0;
@@ -231,7 +238,7 @@ void Tracker::RefreshLastFrame() {
   const double unit = map->UnitOf(last_.reference);
   if (velocity_.has_value()) velocity_->translation *= unit / last_.reference_unit;
   last_.reference_unit = unit;
-  view_.revision = map->revision();
+  revision_ = map->revision();
   const Keyframe* keyframe = map->keyframes().Find(last_keyframe_);
   if (keyframe != nullptr && keyframe->frame_id() == last_.id) last_.landmarks = keyframe->landmarks();
   for (size_t i = 0; i < last_.landmarks.size(); ++i) {
@@ -263,9 +270,9 @@ std::optional<Eigen::Quaterniond> Tracker::Rotation() const {
 
 bool Tracker::TrackFrame() {
   RefreshLastFrame();
-  const uint32_t revision = view_.revision;
+  const uint32_t revision = revision_;
   const bool tracked = TrackFromLastFrame();
-  if (view_.revision == revision) return tracked;
+  if (revision_ == revision) return tracked;
   // Points from before a correction of the map were mixed with points from after it.
   RefreshLastFrame();
   return TrackFromLastFrame();
@@ -273,10 +280,11 @@ bool Tracker::TrackFrame() {
 
 bool Tracker::TrackFromLastFrame() {
   const Rigid3 predicted = PredictMotion().value_or(Rigid3()) * last_.cam_from_world;
-  int inliers = pose_tracker_.TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
+  int inliers =
+      localiser_.pose_tracker().TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
   if (inliers < options_.min_motion_inliers) {
-    inliers = pose_tracker_.TrackFromFrame(last_, last_.cam_from_world,
-                                           kWideSearch * options_.motion_radius_px, &frame_);
+    inliers = localiser_.pose_tracker().TrackFromFrame(last_, last_.cam_from_world,
+                                                       kWideSearch * options_.motion_radius_px, &frame_);
   }
   if (inliers < options_.min_motion_inliers) {
     reason_ =
@@ -292,61 +300,25 @@ int Tracker::MinInliers() const {
 }
 
 bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
-  view_builder_.Build(*map_->Read(), frame_.landmarks, options_.local_keyframes, &view_);
-  if (!view_.reference.IsValid()) return false;
-  // The second time from the better pose finds what the first one just missed.
-  for (int pass = 0; pass < kLocalMapPasses; ++pass) {
-    inliers_ = pose_tracker_.TrackLocalMap(view_, radius_px, &frame_, &in_view_);
-  }
+  inliers_ = localiser_.TrackLocalMap(radius_px, &frame_);
+  revision_ = localiser_.view().revision;
   if (inliers_ >= min_inliers) return true;
   reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
   return false;
 }
 
-// Those that look like the frame, and the youngest, where the camera was a moment ago.
-std::vector<KeyframeId> Tracker::RelocalisationCandidates() const {
-  std::vector<KeyframeId> candidates, youngest;
-  if (map_->Read()->keyframes().size() == 0) return candidates;
-  const std::vector<uint64_t> words =
-      PlaceWords(frame_.features, frame_.static_probability, kMinStaticProbability);
-  {
-    const auto map = map_->Read();
-    for (const PlaceMatch& match : map->places().Query(words)) candidates.push_back(match.keyframe);
-    map->keyframes().ForEach([&](const Keyframe& keyframe) { youngest.push_back(keyframe.id()); });
-  }
-  const size_t count = static_cast<size_t>(options_.relocalisation_keyframes);
-  candidates.resize(std::min(candidates.size(), count - count / 4));
-  for (size_t i = youngest.size(); i-- > 0 && candidates.size() < count;) {
-    if (std::find(candidates.begin(), candidates.end(), youngest[i]) == candidates.end()) {
-      candidates.push_back(youngest[i]);
-    }
-  }
-  return candidates;
-}
-
 bool Tracker::Relocalise() {
-  const std::vector<KeyframeId> candidates = RelocalisationCandidates();
-  if (candidates.empty()) return false;
-  const std::string why_lost = reason_;
-  for (const KeyframeId candidate : candidates) {
-    int inliers = 0;
-    if (const auto map = map_->Read(); const Keyframe* keyframe = map->keyframes().Find(candidate)) {
-      inliers = pose_tracker_.TrackFromKeyframe(*map, *keyframe, random_, &frame_);
-    }
-    if (inliers < options_.pnp.min_inliers) continue;
-    if (!TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, MinInliers())) continue;
-    // Once more from the better pose, with the narrow window.
-    const int min_inliers = std::max(options_.min_relocalisation_inliers, MinInliers());
-    if (TrackLocalMap(options_.local_map_radius_px, min_inliers)) {
-      reason_ = fmt::format("found again by keyframe {}", candidate.value());
-      return true;
-    }
+  const std::optional<MapLocaliser::Place> place = localiser_.Relocalise(MinInliers(), random_, &frame_);
+  if (place.has_value()) {
+    inliers_ = place->inliers;
+    reason_ = fmt::format("found again by keyframe {}", place->keyframe.value());
+    return true;
   }
-  frame_.ClearLandmarks();
   inliers_ = 0;
+  if (localiser_.candidates() == 0) return false;
   reason_ = fmt::format("{}; none of {} keyframes matches the image",
-                        why_lost.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : why_lost,
-                        candidates.size());
+                        reason_.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : reason_,
+                        localiser_.candidates());
   return false;
 }
 
@@ -361,20 +333,22 @@ double Tracker::MedianDepthOfFrame() const {
 
 void Tracker::CountVisibility() {
   const bool shield = filter_.options().shield_hidden && filter_.HasBoxes();
-  for (size_t i = 0; i < view_.size(); ++i) {
-    if (in_view_[i] == 0) continue;
+  const LocalView& view = localiser_.view();
+  for (size_t i = 0; i < view.size(); ++i) {
+    if (localiser_.in_view()[i] == 0) continue;
     // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
-    if (shield && filter_.IsHidden(camera_.Project(frame_.cam_from_world * view_.positions[i]))) {
+    if (shield && filter_.IsHidden(camera_.Project(frame_.cam_from_world * view.positions[i]))) {
       continue;
     }
-    visibility_.visible.push_back(view_.ids[i]);
+    visibility_.visible.push_back(view.ids[i]);
   }
   for (size_t i = 0; i < frame_.landmarks.size(); ++i) {
     if (!frame_.landmarks[i].IsValid()) continue;
     visibility_.found.push_back(frame_.landmarks[i]);
     visibility_.Judge(frame_.landmarks[i], filter_.Evidence(frame_.static_probability[i], true));
   }
-  for (const LandmarkId id : pose_tracker_.rejected()) visibility_.Judge(id, filter_.Evidence(0.5f, false));
+  for (const LandmarkId id : localiser_.pose_tracker().rejected())
+    visibility_.Judge(id, filter_.Evidence(0.5f, false));
 }
 
 void VisibilityLog::ApplyTo(Map* map) {
@@ -399,6 +373,10 @@ void VisibilityLog::ApplyTo(Map* map) {
 }
 
 void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result) {
+  if (options_.localise_only) {
+    visibility_.Clear();
+    return;
+  }
   most_inliers_ = std::max(most_inliers_, inliers_);
   KeyframePolicyInput input;
   input.frames_since_keyframe = static_cast<int>(frame_.id.value() - last_keyframe_frame_.value());
@@ -413,7 +391,7 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
     // What the frame's pose is relative to may have moved since the view was made.
     const Map::Anchor anchor = map->ResolveKeyframe(frame_.reference);
     if (anchor.keyframe != frame_.reference ||
-        map->keyframes().At(anchor.keyframe).cam_from_world() != view_.reference_from_world) {
+        map->keyframes().At(anchor.keyframe).cam_from_world() != localiser_.view().reference_from_world) {
       frame_.cam_from_world = map->PoseFromReference(frame_.reference, frame_.cam_from_reference);
     }
     last_keyframe_ = InsertKeyframe(frame_, map.get(), map->keyframes().At(anchor.keyframe).part());
@@ -430,11 +408,12 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
 // A map that lost the camera so soon was probably wrong from the start; another one is kept, and becomes one
 // with the new one when a place in it is known again.
 void Tracker::StartAnewWhenLostForLong(TrackingResult* result) {
-  if (lost_frames_ < options_.restart_after_frames) return;
+  if (lost_frames_ < options_.restart_after_frames || options_.localise_only) return;
   const PartId part = PartOfFrame();
-  int keyframes = 0;
-  map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) { keyframes += keyframe.part() == part; });
-  const bool is_small = keyframes <= options_.small_map_keyframes;
+  const int keyframes =
+      part.IsValid() ? KeyframesIn(part) : static_cast<int>(map_->Read()->keyframes().size());
+  // Only what was started here may be wrong.
+  const bool is_small = part.IsValid() && part == start_part_ && keyframes <= options_.small_map_keyframes;
   reason_ = fmt::format("starting again: lost for {} frames; the map of {} keyframes is {}", lost_frames_,
                         keyframes, is_small ? "given up" : "kept");
   if (is_small) {

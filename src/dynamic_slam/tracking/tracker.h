@@ -12,12 +12,11 @@
 #include "dynamic_slam/features/orb_extractor.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
-#include "dynamic_slam/map/local_view.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/tracking/dynamic_filter.h"
 #include "dynamic_slam/tracking/initializer.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
-#include "dynamic_slam/tracking/pose_tracker.h"
+#include "dynamic_slam/tracking/map_localiser.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 
 namespace dynamic_slam {
@@ -40,7 +39,9 @@ struct TrackingResult {
   KeyframeReason keyframe_reason = KeyframeReason::kNone;
   std::vector<KeyframeId> new_keyframes;     // inserted into the map, waiting for local mapping
   uint32_t map_epoch = 0;                    // of the map that they belong to
-  std::vector<EarlierFrame> earlier_frames;  // that have a pose since the map was made
+  std::vector<AnchoredPose> earlier_frames;  // that have a pose since the map was made
+  int min_inliers = 0;                       // that a pose of this image needs
+  bool may_be_erased = false;                // the part of the map in which the pose is: it is young
   bool part_was_erased = false;              // of the map, with the poses of the frames in it
 };
 
@@ -86,6 +87,9 @@ class Tracker {
   // The rotation that was found; none without a pose in this frame or the last.
   std::optional<Eigen::Quaterniond> Rotation() const;
 
+  // The map was read from a file: the camera is somewhere in it, or somewhere else. Before the first image.
+  void ExpectKnownPlace() { state_ = TrackingState::kLost; }
+
   // Forgets everything, and empties the map: the same images give the same poses again.
   void Reset();
 
@@ -102,10 +106,10 @@ class Tracker {
   void ErasePart(TrackingResult* result);
   void ForgetPose();
   PartId PartOfFrame() const;
+  int KeyframesIn(PartId part) const;
   bool TrackFrame();
   bool TrackFromLastFrame();
   bool Relocalise();
-  std::vector<KeyframeId> RelocalisationCandidates() const;
   int MinInliers() const;
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
@@ -123,11 +127,10 @@ class Tracker {
   std::array<double, 4> bounds_;
   OrbExtractor extractor_;
   Initializer initializer_;
-  PoseTracker pose_tracker_;
+  MapLocaliser localiser_;
   DynamicFilter filter_;
   KeypointFlow flow_;
   double share_in_boxes_ = 0;  // of the keypoints, those in the boxes of movers
-  LocalViewBuilder view_builder_;
   uint64_t seed_;
   Random random_;
 
@@ -136,6 +139,7 @@ class Tracker {
   bool last_has_pose_ = false;
   bool start_is_certain_ = true;
   PartId start_part_;               // of the map, that the last start made
+  bool start_is_young_ = false;     // its part is erased when the camera is lost now
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
   double velocity_dt_s_ = 0;        // the time between these two
   KeyframeId last_keyframe_;
@@ -145,8 +149,7 @@ class Tracker {
   int inliers_ = 0;
   int most_inliers_ = 0;  // since the last keyframe
   std::string reason_;
-  LocalView view_;
-  std::vector<uint8_t> in_view_;
+  uint32_t revision_ = 0;  // of the map, when the frame's points were taken out of it
   VisibilityLog visibility_;
 };
 

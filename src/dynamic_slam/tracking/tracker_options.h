@@ -36,10 +36,11 @@ struct InitializerOptions {
     visit("max_cost_ratio", self.max_cost_ratio,
           OptionField{"", 0, 1,
                       "Of two motions that fit, the errors of the better over those of the other, at most."});
-    visit("movers_min_parallax_deg", self.movers_min_parallax_deg,
-          OptionField{"deg", 0, 20,
-                      "The parallax of two_view where half of the keypoints or more are on movers, in between "
-                      "as far as they are: what is left tells less of which motion it was."});
+    visit(
+        "movers_min_parallax_deg", self.movers_min_parallax_deg,
+        OptionField{"deg", 0, 20,
+                    "The parallax of two_view where half of the keypoints or more are on movers, in between "
+                    "as far as they are: what is left tells less of which motion it was."});
     visit("movers_min_points", self.movers_min_points,
           OptionField{"", 8, 5000, "The points of two_view there."});
     visit("two_view", self.two_view);
@@ -84,6 +85,7 @@ struct TrackerOptions {
   int relocalisation_keyframes = 20;
   int restart_after_frames = 15;
   int small_map_keyframes = 5;
+  bool localise_only = false;
   InitializerOptions initializer;
   KeyframePolicyOptions keyframe;
   PoseOptimizerOptions pose;
@@ -119,6 +121,11 @@ struct TrackerOptions {
     visit("small_map_keyframes", self.small_map_keyframes,
           OptionField{"", 0, 1000,
                       "A map of at most so many keyframes is given up then; a larger one is kept."});
+    visit("localise_only", self.localise_only,
+          OptionField{
+              "", 0, 1,
+              "Poses in the map that was loaded, and nothing else: the map stays as it is, and no other "
+              "is started."});
     visit("initializer", self.initializer);
     visit("keyframe", self.keyframe);
     visit("pose", self.pose);

@@ -1,0 +1,220 @@
+#include "dynamic_slam/tracking/backfiller.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "dynamic_slam/base/trace.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr size_t kMaxKeypoints = 2'000'000;
+
+// From poses more frames away nobody knows where the camera is.
+constexpr double kMaxGapFrames = 4;
+
+// A camera that is so many times as fast as it nearly always was between two frames is a wrong pose: a few
+// landmarks found by chance, or on somebody who moves. With fewer steps known nobody can tell.
+constexpr double kMaxSpeedRatio = 2, kNearlyAlways = 0.95;
+constexpr size_t kMinSteps = 20;
+
+// A motion is not carried on for longer than so many times the time in which it was seen.
+constexpr double kMaxSteps = 5;
+
+// What the motion model looks through, and, as it is only a guess, three times as much.
+constexpr double kSearches[] = {1.0, 3.0};
+
+double Percentile(double share, std::vector<double>* values) {
+  const auto at =
+      values->begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values->size() - 1));
+  std::nth_element(values->begin(), at, values->end());
+  return *at;
+}
+
+Eigen::Vector3d CentreOf(const AnchoredPose& pose, const Map& map) {
+  return map.PoseFromReference(pose.reference, pose.cam_from_reference).TargetOriginInSource();
+}
+
+}  // namespace
+
+Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map)
+    : options_(options),
+      map_(map),
+      bounds_(camera.IdealBounds()),
+      localiser_(camera, options, map->Read()->octave_scales(), map),
+      seed_(seed),
+      random_(seed) {}
+
+void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
+  kept_.push_back(
+      {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
+  keypoints_ += frame.features.size();
+  while (keypoints_ > kMaxKeypoints) {
+    keypoints_ -= kept_.front().features.size();
+    kept_.pop_front();
+  }
+}
+
+void Backfiller::ForgetPosed() {
+  std::erase_if(kept_, [this](const KeptFrame& kept) {
+    if (kept.has_pose) keypoints_ -= kept.features.size();
+    return kept.has_pose;
+  });
+}
+
+void Backfiller::PartWasErased() {
+  for (KeptFrame& kept : kept_) kept.has_pose = false;
+}
+
+void Backfiller::Clear() {
+  kept_.clear();
+  keypoints_ = 0;
+  random_ = Random(seed_);
+}
+
+std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
+                                           const std::function<bool()>& should_stop) {
+  DS_TRACE("backfill");
+  Known poses;
+  for (const AnchoredPose& pose : known) poses.emplace(pose.timestamp_s, pose);
+  LearnMotion(poses);
+  std::vector<AnchoredPose> found;
+  // To and fro, as each pose found is a neighbour to the next.
+  for (bool is_forward = true, goes_on = true; goes_on || !is_forward; is_forward = !is_forward) {
+    if (is_forward) goes_on = false;
+    for (size_t i = 0; i < kept_.size(); ++i) {
+      KeptFrame& kept = kept_[is_forward ? i : kept_.size() - 1 - i];
+      if (poses.contains(kept.timestamp_s)) continue;
+      if (should_stop && should_stop()) return found;
+      const std::optional<AnchoredPose> pose = FindPose(poses, &kept);
+      if (!pose.has_value()) continue;
+      poses.emplace(pose->timestamp_s, *pose);
+      found.push_back(*pose);
+      goes_on = true;
+    }
+  }
+  return found;
+}
+
+std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* kept) {
+  const auto next = known.upper_bound(kept->timestamp_s);
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const std::pair between(next == known.begin() ? -kNone : std::prev(next)->first,
+                          next == known.end() ? kNone : next->first);
+  if (kept->tried_between == between) return std::nullopt;
+  const bool is_first_try = !kept->tried_between.has_value();
+  kept->tried_between = between;
+
+  Frame frame;
+  frame.id = kept->id;
+  frame.timestamp_s = kept->timestamp_s;
+  frame.features = kept->features;
+  frame.static_probability = kept->static_probability;
+  frame.grid.Build(frame.features, bounds_);
+  const auto is_plausible = [&] {
+    localiser_.Anchor(&frame);
+    return IsPlausible(known, {frame.timestamp_s, frame.reference, frame.cam_from_reference});
+  };
+  const auto fits = [&](const Guess& guess, double search) {
+    return localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
+                                &frame) >= options_.min_motion_inliers &&
+           localiser_.TrackLocalMap(options_.local_map_radius_px, &frame) >= kept->min_inliers &&
+           is_plausible();
+  };
+  bool is_found = false;
+  for (const Guess& guess : Guesses(known, kept->timestamp_s)) {
+    for (const double search : kSearches) is_found = is_found || fits(guess, search);
+    if (is_found) break;
+  }
+  // What it looks like does not change with its neighbours.
+  if (!is_found && is_first_try) {
+    is_found = localiser_.Relocalise(kept->min_inliers, random_, &frame).has_value() && is_plausible();
+  }
+  if (!is_found) return std::nullopt;
+  return AnchoredPose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
+}
+
+std::vector<Backfiller::Guess> Backfiller::Guesses(const Known& known, double timestamp_s) const {
+  std::vector<Guess> guesses;
+  const auto next = known.upper_bound(timestamp_s);
+  const AnchoredPose *before = nullptr, *after = nullptr, *before_that = nullptr, *after_that = nullptr;
+  if (next != known.begin() && timestamp_s - std::prev(next)->first <= max_gap_s_) {
+    before = &std::prev(next)->second;
+    if (std::prev(next) != known.begin()) before_that = &std::prev(next, 2)->second;
+  }
+  if (next != known.end() && next->first - timestamp_s <= max_gap_s_) {
+    after = &next->second;
+    if (std::next(next) != known.end()) after_that = &std::next(next)->second;
+  }
+  const auto map = map_->Read();
+  if (before != nullptr && after != nullptr &&
+      map->PartOf(before->reference) == map->PartOf(after->reference)) {
+    const double share = (timestamp_s - before->timestamp_s) / (after->timestamp_s - before->timestamp_s);
+    const Rigid3 from = map->PoseFromReference(before->reference, before->cam_from_reference).Inverse();
+    const Rigid3 to = map->PoseFromReference(after->reference, after->cam_from_reference).Inverse();
+    const Rigid3 world_from_cam(from.rotation.slerp(share, to.rotation),
+                                (1 - share) * from.translation + share * to.translation);
+    const AnchoredPose& nearer = share < 0.5 ? *before : *after;
+    guesses.push_back({map->ResolveKeyframe(nearer.reference).keyframe, world_from_cam.Inverse()});
+  }
+  if (before != nullptr) Extrapolate(*before, before_that, timestamp_s, *map, &guesses);
+  if (after != nullptr) Extrapolate(*after, after_that, timestamp_s, *map, &guesses);
+  return guesses;
+}
+
+void Backfiller::Extrapolate(const AnchoredPose& nearer, const AnchoredPose* farther, double timestamp_s,
+                             const Map& map, std::vector<Guess>* guesses) const {
+  const KeyframeId keyframe = map.ResolveKeyframe(nearer.reference).keyframe;
+  const Rigid3 pose = map.PoseFromReference(nearer.reference, nearer.cam_from_reference);
+  if (farther != nullptr && map.PartOf(farther->reference) == map.PartOf(nearer.reference)) {
+    const Rigid3 motion =
+        pose * map.PoseFromReference(farther->reference, farther->cam_from_reference).Inverse();
+    const double steps =
+        std::min((timestamp_s - nearer.timestamp_s) / (nearer.timestamp_s - farther->timestamp_s), kMaxSteps);
+    guesses->push_back(
+        {keyframe, Rigid3(ExpSo3(steps * LogSo3(motion.rotation)), steps * motion.translation) * pose});
+  }
+  guesses->push_back({keyframe, pose});
+}
+
+void Backfiller::LearnMotion(const Known& known) {
+  max_gap_s_ = 0;
+  max_speed_.clear();
+  std::vector<double> intervals_s;
+  for (auto pose = known.begin(); pose != known.end() && std::next(pose) != known.end(); ++pose) {
+    intervals_s.push_back(std::next(pose)->first - pose->first);
+  }
+  if (intervals_s.empty()) return;
+  max_gap_s_ = kMaxGapFrames * Percentile(0.5, &intervals_s);
+  std::map<PartId, std::vector<double>> speeds;
+  const auto map = map_->Read();
+  for (auto pose = known.begin(); std::next(pose) != known.end(); ++pose) {
+    const AnchoredPose &a = pose->second, &b = std::next(pose)->second;
+    const double dt_s = b.timestamp_s - a.timestamp_s;
+    const PartId part = map->PartOf(a.reference);
+    if (dt_s > max_gap_s_ || map->PartOf(b.reference) != part) continue;
+    speeds[part].push_back((CentreOf(a, *map) - CentreOf(b, *map)).norm() / dt_s);
+  }
+  for (auto& [part, all] : speeds) {
+    if (all.size() >= kMinSteps) max_speed_[part] = kMaxSpeedRatio * Percentile(kNearlyAlways, &all);
+  }
+}
+
+bool Backfiller::IsPlausible(const Known& known, const AnchoredPose& pose) const {
+  const auto map = map_->Read();
+  const PartId part = map->PartOf(pose.reference);
+  const auto limit = max_speed_.find(part);
+  if (limit == max_speed_.end()) return true;
+  const auto is_reachable = [&](const AnchoredPose& other) {
+    return map->PartOf(other.reference) != part ||
+           (CentreOf(other, *map) - CentreOf(pose, *map)).norm() <=
+               limit->second * std::abs(other.timestamp_s - pose.timestamp_s);
+  };
+  const auto next = known.upper_bound(pose.timestamp_s);
+  return (next == known.end() || is_reachable(next->second)) &&
+         (next == known.begin() || is_reachable(std::prev(next)->second));
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "dynamic_slam/base/random.h"
+#include "dynamic_slam/map/frame.h"
+#include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/tracking/map_localiser.h"
+
+namespace dynamic_slam {
+
+// Gives frames that had no pose when their turn came one in the finished map, which knows more: from where
+// the frames before and after them are, or else from what they look like. A pose needs as many inliers as it
+// did then, and must be one to which the camera can have moved from those before and after it.
+class Backfiller {
+ public:
+  Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);
+
+  // Keeps what is needed of a frame. has_pose: it has one, but its part of the map may be erased yet. The
+  // oldest frames are forgotten when all together have more than two million keypoints (130 MB).
+  void Keep(const Frame& frame, int min_inliers, bool has_pose);
+
+  // No part of the map will be erased for the frames that have a pose: they are forgotten.
+  void ForgetPosed();
+  // They have none any more.
+  void PartWasErased();
+
+  // The poses of frames kept, in the order in which they were found. known: of all frames that have one, in a
+  // part of the map that is there. `should_stop` may be empty; when it says so, that is all.
+  std::vector<AnchoredPose> Find(std::span<const AnchoredPose> known,
+                                 const std::function<bool()>& should_stop);
+
+  void Clear();
+
+ private:
+  struct KeptFrame {
+    FrameId id;
+    double timestamp_s = 0;
+    FeatureSet features;
+    std::vector<float> static_probability;
+    int min_inliers = 0;
+    bool has_pose = false;
+    std::optional<std::pair<double, double>> tried_between;  // stamps of the poses before and after it, s
+  };
+  using Known = std::map<double, AnchoredPose>;  // by stamp
+
+  // Where a frame may be, and a keyframe near there.
+  struct Guess {
+    KeyframeId keyframe;
+    Rigid3 cam_from_world;
+  };
+
+  // How fast the camera was, and how often there are frames.
+  void LearnMotion(const Known& known);
+  // Whether the camera can have come there from the pose before, and from there to the pose after.
+  bool IsPlausible(const Known& known, const AnchoredPose& pose) const;
+  std::optional<AnchoredPose> FindPose(const Known& known, KeptFrame* kept);
+  std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
+  // Adds where the camera is at the stamp if it went on as between the two poses, and where it was at the
+  // nearer.
+  void Extrapolate(const AnchoredPose& nearer, const AnchoredPose* farther, double timestamp_s,
+                   const Map& map, std::vector<Guess>* guesses) const;
+
+  TrackerOptions options_;
+  SharedMap* map_;
+  std::array<double, 4> bounds_;
+  MapLocaliser localiser_;
+  uint64_t seed_;
+  Random random_;
+  std::deque<KeptFrame> kept_;  // in the order of time
+  size_t keypoints_ = 0;        // of all of them
+  double max_gap_s_ = 0;
+  std::map<PartId, double> max_speed_;  // map units per s
+};
+
+}  // namespace dynamic_slam

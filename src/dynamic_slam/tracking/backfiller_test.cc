@@ -1,0 +1,97 @@
+#include "dynamic_slam/tracking/backfiller.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/map/synthetic_world.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::IsEmpty;
+
+// A camera that moves sideways past a map, 1 unit a second.
+class BackfillerTest : public testing::Test {
+ protected:
+  static constexpr int kMinInliers = 40;
+
+  BackfillerTest() {
+    for (const double x : {0.0, 0.5, 1.0}) keyframes_.push_back(scene_.Add(SidewaysPose(x)));
+    scene_.AddLandmarks(0, static_cast<uint32_t>(world_.size()), keyframes_);
+    // 20 frames a second, but for a gap about 0.5 s.
+    for (int i = 0; i <= 30; ++i) {
+      const double t = 0.05 * i;
+      if (std::abs(t - 0.5) < 0.12) continue;
+      known_.push_back({t, keyframes_[0], SidewaysPose(t)});
+    }
+  }
+
+  // At x = t, unless it is told.
+  Frame FrameAt(double timestamp_s, std::optional<Rigid3> cam_from_world = {}) {
+    Frame frame = world_.See(cam_from_world.value_or(SidewaysPose(timestamp_s))).frame;
+    frame.timestamp_s = timestamp_s;
+    frame.cam_from_world = Rigid3();
+    return frame;
+  }
+  Eigen::Vector3d CentreOf(const AnchoredPose& pose) const {
+    return scene_.map.PoseFromReference(pose.reference, pose.cam_from_reference).TargetOriginInSource();
+  }
+
+  SyntheticWorld world_{600};
+  SyntheticMap scene_{&world_};
+  std::vector<KeyframeId> keyframes_;
+  std::vector<AnchoredPose> known_;
+  Backfiller backfiller_{world_.camera(), TrackerOptions(), 1, &scene_.shared_map};
+};
+
+TEST_F(BackfillerTest, FramesBeforeBetweenAndAfterKnownPosesGetOne) {
+  for (const double t : {-0.1, -0.05, 0.4, 0.45, 0.5, 0.6, 1.55})
+    backfiller_.Keep(FrameAt(t), kMinInliers, false);
+  const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
+  EXPECT_EQ(found.size(), 7u);
+  for (const AnchoredPose& pose : found) {
+    EXPECT_LT((CentreOf(pose) - Eigen::Vector3d(pose.timestamp_s, 0, 0)).norm(), 0.02) << pose.timestamp_s;
+  }
+}
+
+TEST_F(BackfillerTest, WhatLooksLikeNothingInTheMapHasNoPose) {
+  world_.Repaint(0);
+  backfiller_.Keep(FrameAt(0.5), kMinInliers, false);
+  EXPECT_THAT(backfiller_.Find(known_, {}), IsEmpty());
+}
+
+TEST_F(BackfillerTest, APoseNeedsTheInliersThatItNeededThen) {
+  backfiller_.Keep(FrameAt(0.5), 10000, false);
+  EXPECT_THAT(backfiller_.Find(known_, {}), IsEmpty());
+}
+
+TEST_F(BackfillerTest, FarFromAnyPoseAFrameIsFoundByWhatItLooksLike) {
+  backfiller_.Keep(FrameAt(100, SidewaysPose(0.5)), kMinInliers, false);
+  const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_LT((CentreOf(found[0]) - Eigen::Vector3d(0.5, 0, 0)).norm(), 0.02);
+}
+
+TEST_F(BackfillerTest, NobodyIsFasterThanTheCameraEverWas) {
+  backfiller_.Keep(FrameAt(0.5, SidewaysPose(1.0)), kMinInliers, false);
+  EXPECT_THAT(backfiller_.Find(known_, {}), IsEmpty());
+}
+
+TEST_F(BackfillerTest, FramesOfAnErasedPartAreFoundAndOthersAreNotLookedFor) {
+  backfiller_.Keep(FrameAt(0.4), kMinInliers, true);
+  backfiller_.PartWasErased();
+  backfiller_.Keep(FrameAt(0.6), kMinInliers, true);
+  backfiller_.ForgetPosed();
+  const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].timestamp_s, 0.4);
+}
+
+TEST_F(BackfillerTest, StopsWhenItIsTold) {
+  for (const double t : {0.4, 0.5, 0.6}) backfiller_.Keep(FrameAt(t), kMinInliers, false);
+  int asked = 0;
+  EXPECT_EQ(backfiller_.Find(known_, [&asked] { return ++asked == 3; }).size(), 2u);
+}
+
+}  // namespace
+}  // namespace dynamic_slam
