@@ -8,6 +8,7 @@
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/detector_factory.h"
+#include "dynamic_slam/io/trajectory_file.h"
 #include "source_arguments.h"
 
 namespace dynamic_slam {
@@ -52,22 +53,22 @@ BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_
   ApplySet(&options, assignments);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(source_name, arguments.source_options);
   BenchRun run;
-  run.system = std::make_unique<SlamSystem>(ChooseCamera(arguments.camera, source_name, *source), options);
-  if (std::shared_ptr<Detector> detector =
-          MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models)) {
-    run.detector = std::make_shared<RecordingDetector>(std::move(detector));
-  }
-  run.system->SetDetector(run.detector);
+  const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
+  run.system = std::make_unique<SlamSystem>(camera, options);
+  RunRecorder recorder(source_name, camera, options.image);
+  run.system->SetDetector(
+      recorder.Record(MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models)));
   RunControl control = console->Control();
-  if (on_frame) {
-    control.on_frame = [console, &on_frame](const RunProgress& progress) {
-      console->Show(progress);
-      on_frame(progress);
-    };
-  }
+  control.on_frame = [&](const RunProgress& progress) {
+    console->Show(progress);
+    recorder.Watch(progress);
+    if (on_frame) on_frame(progress);
+  };
   run.summary = RunSequence(*source, *run.system, control);
+  run.summary.source = source_name;
   console->End();
   if (run.summary.failure != nullptr) std::rethrow_exception(run.summary.failure);
+  run.record = recorder.Finish(run.summary, LoadGroundTruth(source_name));
   return run;
 }
 

@@ -11,8 +11,8 @@
 #include "dynamic_slam/eval/curve_plot.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/sequence_runner.h"
-#include "recording_detector.h"
 #include "run_console.h"
+#include "run_recorder.h"
 
 namespace dynamic_slam {
 
@@ -37,8 +37,8 @@ inline constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.05;
 
 struct BenchRun {
   std::unique_ptr<SlamSystem> system;
-  std::shared_ptr<RecordingDetector> detector;  // none without one
   RunSummary summary;
+  RunRecord record;
 };
 
 // Runs the source with these assignments after those of the arguments. `on_frame` may be empty. What a stage

@@ -14,7 +14,6 @@
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/sim/simulation.h"
 #include "experiment.h"
-#include "frame_picture.h"
 #include "render_sequence.h"
 #include "run_console.h"
 
@@ -24,42 +23,11 @@ namespace {
 constexpr const char* kDefaultOut = "out/demo";
 // As TUM's walking_xyz: two people walk before the camera, which sways along all axes. And a block by car.
 constexpr const char* kScenes[] = {"office_walk", "street_short"};
-constexpr int kPicturesOfScene = 4;
 
 struct DemoArguments : BenchArguments {
   std::optional<uint64_t> seed;
   std::optional<int> frames;
   bool force = false;
-};
-
-// Of each stretch of the run, the frame in which dynamic objects take most of the image.
-class PictureChooser {
- public:
-  explicit PictureChooser(DemoScene* scene) : scene_(scene) {}
-
-  void Watch(const RunProgress& progress) {
-    const size_t stretch =
-        (progress.frame - 1) * kPicturesOfScene / std::max<size_t>(1, progress.frames_total);
-    double area = 0;
-    for (const DynamicBox& box : progress.result->objects.boxes) area += box.is_dynamic ? box.box.Area() : 0;
-    if (stretch == stretch_ && area <= most_area_ && !scene_->frames.empty()) return;
-    if (stretch != stretch_ || scene_->frames.empty()) {
-      scene_->frames.emplace_back();
-      scene_->captions.emplace_back();
-    }
-    stretch_ = stretch;
-    most_area_ = area;
-    scene_->frames.back() = progress.image->image.clone();
-    DrawFrame(progress, &scene_->frames.back());
-    const DynamicKeypoints& dynamic = progress.result->tracking.dynamic;
-    scene_->captions.back() = fmt::format("frame {}: {} of {} keypoints in dynamic boxes", progress.frame - 1,
-                                          dynamic.InBoxes(), progress.result->tracking.keypoints);
-  }
-
- private:
-  DemoScene* scene_;
-  size_t stretch_ = 0;
-  double most_area_ = 0;
 };
 
 DemoScene RunScene(const DemoArguments& arguments, const std::string& name, RunConsole* console) {
@@ -73,18 +41,17 @@ DemoScene RunScene(const DemoArguments& arguments, const std::string& name, RunC
   DemoScene scene;
   scene.name = name;
   scene.truth = LoadGroundTruth(sequence).value_or(Trajectory());
-  const auto write_to = [](const std::filesystem::path& folder) {
-    return [folder](const SlamSystem& system, const RunSummary& summary) {
-      WriteResults(folder, system, summary);
+  const auto write_to = [&name](const std::filesystem::path& folder, const std::string& what) {
+    return [=](const SlamSystem& system, const ExperimentRun& run) {
+      WriteResults(folder, system, run.summary);
+      WriteRunReport(folder, fmt::format("{}, {}", name, what), system, run.summary, run.record);
     };
   };
-  PictureChooser chooser(&scene);
-  scene.with = RunExperiment(
-      arguments, sequence.string(), console,
-      [&chooser](const RunProgress& progress) { chooser.Watch(progress); }, write_to(out / "with"));
+  scene.with =
+      RunExperiment(arguments, sequence.string(), console, {}, write_to(out / "with", "with semantics"));
   if (console->ShouldStop()) return scene;
-  scene.without =
-      RunExperiment(WithoutSemantics(arguments), sequence.string(), console, {}, write_to(out / "without"));
+  scene.without = RunExperiment(WithoutSemantics(arguments), sequence.string(), console, {},
+                                write_to(out / "without", "without semantics"));
   return scene;
 }
 

@@ -16,7 +16,7 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include "box_picture.h"
+#include "dynamic_slam/report/box_picture.h"
 #include "compensated_detections.h"
 #include "detection_report.h"
 #include "dynamic_slam/base/error.h"

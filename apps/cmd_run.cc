@@ -16,11 +16,13 @@
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
 #include "mask_folder.h"
 #include "overlay_writer.h"
 #include "run_console.h"
+#include "run_recorder.h"
 #include "source_arguments.h"
 #include "truth_report.h"
 
@@ -36,6 +38,7 @@ struct RunArguments {
   std::string mode = "offline";
   std::string out;
   std::string trace;
+  std::string truth;
   std::string models;
   std::string overlay, masks, export_masks;
   std::optional<double> detector_latency_ms;
@@ -71,8 +74,11 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   const Camera camera = ChooseCamera(arguments.camera, arguments.source, *source);
   const std::filesystem::path out = OutputFolder(arguments);
+  std::optional<Trajectory> truth;
+  if (!arguments.truth.empty()) truth = ReadGroundTruth(arguments.truth, arguments.source);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
-  system.SetDetector(detector);
+  RunRecorder recorder(arguments.source, camera, options.image);
+  system.SetDetector(recorder.Record(detector));
   if (!arguments.masks.empty() && !std::filesystem::is_directory(arguments.masks)) {
     throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
   }
@@ -96,6 +102,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   }
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
+    recorder.Watch(progress);
     if (overlay.has_value()) overlay->Write(progress);
     if (masks.has_value()) masks->Write(*progress.image, *progress.result);
   };
@@ -106,9 +113,11 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (is_hopeless) std::rethrow_exception(summary.failure);
   WriteResults(out, system, summary);
   PrintSummary(summary);
-  ReportTruth(arguments.source, system.FrameTrajectory(), out);
+  if (arguments.truth.empty()) truth = FindTruth(arguments.source);
+  if (truth.has_value()) ReportTruth(*truth, system.FrameTrajectory(), out);
+  WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
   if (!arguments.trace.empty()) EndTrace(arguments.trace);
-  fmt::print("results: {}\n", out.string());
+  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
@@ -150,6 +159,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
   command->add_option("--trace", a.trace,
                       "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
+  command->add_option("--truth", a.truth,
+                      "Ground truth, in TUM's or KITTI's format (default: that beside the images)");
   AddSourceOptions(command, &a.source_options);
   command->add_flag("--quiet", a.quiet, "No progress line");
   command->footer(
