@@ -63,7 +63,7 @@ nlohmann::ordered_json ToJson(const DetectionMetrics& metrics) {
 }
 
 // How many boxes each frame has, and how many of them were found.
-cv::Mat DrawRecall(const std::string& title, const std::vector<RecallOfFrame>& frames) {
+CurvePlot PlotRecall(const std::string& title, const std::vector<RecallOfFrame>& frames) {
   CurvePlot plot{title, "time [s]", "boxes", {}};
   CurvePlot::Curve all{"true boxes", kTruthColour, {}, 5},
       before{"found by the detector", kWithoutColour, {}, 1.2},
@@ -77,7 +77,7 @@ cv::Mat DrawRecall(const std::string& title, const std::vector<RecallOfFrame>& f
     add(after, frame.after.hits);
   }
   plot.curves = {all, before, after};
-  return DrawCurves(plot, 1100, 340);
+  return plot;
 }
 
 void PrintRow(const std::string& name, const DetectionMetrics& m) {
@@ -132,7 +132,12 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
   const std::string title =
       fmt::format("Recall per frame: {:.1f}% before, {:.1f}% after compensation (the paper: 82.3%, 99.8%)",
                   100 * run.recall_before.FrameRecall(), 100 * run.recall_after.FrameRecall());
-  WritePicture((out / "recall.png").string(), DrawRecall(title, frames));
+  const CurvePlot plot = PlotRecall(title, frames);
+  WritePicture((out / "recall.png").string(), DrawCurves(plot, 1100, 340));
+  nlohmann::ordered_json before = {{"boxes", "of the detector"}}, after = {{"boxes", "after compensation"}};
+  before.update(ToJson(run.recall_before));
+  after.update(ToJson(run.recall_after));
+  WriteBenchReport(out, "Recall of the detector", arguments, {before, after}, {plot});
   fmt::print("\n{:<24} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
   PrintRow("detector", run.recall_before);
   PrintRow("after compensation", run.recall_after);

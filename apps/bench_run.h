@@ -10,6 +10,8 @@
 
 #include "dynamic_slam/eval/curve_plot.h"
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/report/report_page.h"
+#include "dynamic_slam/report/table.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "run_console.h"
 #include "run_recorder.h"
@@ -41,6 +43,9 @@ struct BenchRun {
   RunRecord record;
 };
 
+// The options that the arguments' --config and --set give. Throws InputError.
+void ApplyArguments(const BenchArguments& arguments, SystemOptions* options);
+
 // Runs the source with these assignments after those of the arguments. `on_frame` may be empty. What a stage
 // throws is thrown here.
 BenchRun RunForBench(const BenchArguments& arguments, const std::string& source,
@@ -57,6 +62,15 @@ void WriteJson(const std::filesystem::path& file, const nlohmann::ordered_json& 
 // The same rows, flat objects with the same keys, as NAME.csv and NAME.json.
 void WriteRows(const std::filesystem::path& folder, const std::string& name,
                const nlohmann::ordered_json& rows);
+
+// Prints the tables; writes tables.txt, tables.json, each table as CSV, and the page as report.html.
+void WriteTables(const std::filesystem::path& folder, const std::vector<Table>& tables,
+                 const ReportPage& page);
+
+// Of an experiment: its rows, if it has some, and its curves, as report.html.
+void WriteBenchReport(const std::filesystem::path& folder, const std::string& title,
+                      const BenchArguments& arguments, const nlohmann::ordered_json& rows,
+                      const std::vector<CurvePlot>& plots);
 
 // Into NAME.png.
 void WriteCurves(const std::filesystem::path& folder, const std::string& name, const CurvePlot& plot);

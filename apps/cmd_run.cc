@@ -67,7 +67,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   TraceThreadName("main");
   if (!arguments.trace.empty()) StartTrace();
   SystemOptions options;
-  if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
+  if (!arguments.config.empty()) LoadProfile(arguments.config, &options);
   ApplySet(&options, arguments.assignments);
   if (arguments.detector_latency_ms) options.detector.latency_ms = *arguments.detector_latency_ms;
   const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
@@ -134,8 +134,9 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->required();
   command->add_option("--camera", a.camera,
                       "Name of a known camera, or camera file (default: what SOURCE says)");
-  command->add_option("--config", a.config,
-                      "YAML file with options (the keys of config.yaml in the results)");
+  command->add_option(
+      "--config", a.config,
+      "YAML file with options (the keys of config.yaml in the results), or a profile: " + ProfileHelp());
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
       ->type_name("KEY=VALUE");
   command->add_option("--detector", a.detector, "Object detector: " + DetectorHelp())->capture_default_str();

@@ -36,9 +36,10 @@ struct ExperimentRun {
 
 // Runs the SLAM offline over a sequence; `on_system` may be empty, and is called when the run has ended.
 // Throws InputError for what is wrong with the sequence or the options.
-ExperimentRun RunExperiment(const BenchArguments& arguments, const std::string& source, RunConsole* console,
-                            const std::function<void(const RunProgress&)>& on_frame = {},
-                            const std::function<void(const SlamSystem&, const ExperimentRun&)>& on_system = {});
+ExperimentRun RunExperiment(
+    const BenchArguments& arguments, const std::string& source, RunConsole* console,
+    const std::function<void(const RunProgress&)>& on_frame = {},
+    const std::function<void(const SlamSystem&, const ExperimentRun&)>& on_system = {});
 
 // The same arguments without the semantic part.
 BenchArguments WithoutSemantics(BenchArguments arguments);

@@ -41,7 +41,7 @@ struct PoseError {
 struct TrajectoryErrors {
   ErrorStatistics translation_m;
   ErrorStatistics rotation_deg;
-  Sim3 reference_from_estimate;  // the alignment that was applied; its scale is evo's
+  Sim3 reference_from_estimate;   // the alignment that was applied; its scale is evo's
   std::vector<PoseError> errors;  // in order
 };
 

@@ -137,7 +137,8 @@ nlohmann::ordered_json PathsSection(const PathPicture& picture) {
   json["points"] = picture.points.empty() ? nlohmann::ordered_json() : PointsJson(picture, bounds);
   json["tracks"] = std::move(tracks);
   json["colour"] = nullptr;
-  if (has_errors) json["colour"] = {{"title", "APE"}, {"unit", "m"}, {"min", 0}, {"max", Rounded(most_error, 6)}};
+  if (has_errors)
+    json["colour"] = {{"title", "APE"}, {"unit", "m"}, {"min", 0}, {"max", Rounded(most_error, 6)}};
   return json;
 }
 

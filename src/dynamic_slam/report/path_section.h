@@ -23,9 +23,9 @@ struct PathTrack {
 
 struct PathPicture {
   std::string title, note;
-  double start_s = 0;              // stamp of the moment 0
-  std::optional<Trajectory> truth; // in metres; without it the unit is the map's
-  std::vector<PathTrack> tracks;   // at least one; the first is the one that the cursor follows
+  double start_s = 0;                        // stamp of the moment 0
+  std::optional<Trajectory> truth;           // in metres; without it the unit is the map's
+  std::vector<PathTrack> tracks;             // at least one; the first is the one that the cursor follows
   std::vector<Eigen::Vector3f> points = {};  // landmarks, in the world of the first track
 };
 

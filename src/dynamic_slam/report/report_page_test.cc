@@ -34,7 +34,8 @@ TEST(ReportPage, HoldsTheDataWhateverIsInIt) {
 TEST(ReportPage, NeedsNothingBesideItself) {
   const std::string text = PageText({.title = "t", .subtitle = "", .times_s = {}});
   EXPECT_THAT(text, HasSubstr("\"use strict\""));
-  for (const char* outside : {"@STYLE@", "@SCRIPT@", "@DATA@", "<script src", "<link rel=\"stylesheet\"", "@import", "https://"}) {
+  for (const char* outside :
+       {"@STYLE@", "@SCRIPT@", "@DATA@", "<script src", "<link rel=\"stylesheet\"", "@import", "https://"}) {
     EXPECT_THAT(text, Not(HasSubstr(outside)));
   }
 }
@@ -47,7 +48,8 @@ TEST(Rounded, IsShortAndNullForWhatIsNoNumber) {
 
 TEST(PathsSection, MovesTheTrackAndKeepsErrorsWithTheirPoses) {
   Trajectory path;
-  for (int i = 0; i < 5; ++i) path.push_back({10.0 + i, {Eigen::Quaterniond::Identity(), {1.0 * i, 0, 2.0 * i}}});
+  for (int i = 0; i < 5; ++i)
+    path.push_back({10.0 + i, {Eigen::Quaterniond::Identity(), {1.0 * i, 0, 2.0 * i}}});
   PathPicture picture{.title = "Path", .note = "", .start_s = 10, .truth = path, .tracks = {}};
   picture.tracks.push_back({.name = "estimate",
                             .colour = "c1",

@@ -45,10 +45,10 @@ Run Gather(const SlamSystem& system, const RunSummary& summary, const RunRecord&
   if (!record.truth.has_value() || run.path.empty()) return run;
   try {
     run.truth = CompareWithTruth(*record.truth, run.path);
-    run.relative = RelativePoseError(MatchByTime(ToPoseList(*record.truth), ToPoseList(run.path),
-                                                 kMaxTruthDifferenceS),
-                                     Alignment::kSim3, {})
-                       .errors;
+    run.relative =
+        RelativePoseError(MatchByTime(ToPoseList(*record.truth), ToPoseList(run.path), kMaxTruthDifferenceS),
+                          Alignment::kSim3, {})
+            .errors;
   } catch (const InputError&) {
     // Too few poses to align, or to have a motion: there is no error to show.
   }
@@ -64,15 +64,17 @@ Json TilesSection(const Run& run) {
   const RunSummary& s = run.summary;
   Json tiles = Json::array();
   const double coverage = s.Coverage();
-  tiles.push_back(Tile("frames tracked live", fmt::format("{:.1f}%", 100 * coverage),
-                       fmt::format("{} of {}, {} given a pose later", s.frames_tracked, s.frames_total,
-                                   s.frames_backfilled),
-                       coverage >= 0.9 ? "good" : coverage >= 0.5 ? "wait" : "bad"));
+  tiles.push_back(Tile(
+      "frames tracked live", fmt::format("{:.1f}%", 100 * coverage),
+      fmt::format("{} of {}, {} given a pose later", s.frames_tracked, s.frames_total, s.frames_backfilled),
+      coverage >= 0.9   ? "good"
+      : coverage >= 0.5 ? "wait"
+                        : "bad"));
   if (run.truth.has_value()) {
     const TruthComparison& truth = *run.truth;
     const double rmse = truth.ape.translation_m.rmse;
     tiles.push_back(
-        Tile("absolute pose error", fmt::format("{:.4g} m", rmse),
+        Tile("absolute pose error", fmt::format("{:.3g} m", rmse),
              fmt::format("rmse; {:.2f}% of the path of {:.4g} m", 100 * rmse / truth.path_m, truth.path_m)));
   }
   if (!run.relative.empty()) {
@@ -85,11 +87,12 @@ Json TilesSection(const Run& run) {
   }
   tiles.push_back(Tile("tracking a frame", fmt::format("{:.1f} ms", s.tracking_ms.median),
                        fmt::format("median; {:.1f} ms for 95%", s.tracking_ms.p95)));
-  tiles.push_back(Tile("keyframes", fmt::format("{}", s.keyframes), fmt::format("{} landmarks", s.landmarks)));
-  tiles.push_back(Tile("lost", fmt::format("{} times", s.lost_count),
-                       s.initialised_at.has_value() ? fmt::format("started at frame {}", *s.initialised_at)
-                                                    : "never started",
-                       s.lost_count > 0 || !s.initialised_at.has_value() ? "wait" : ""));
+  tiles.push_back(
+      Tile("keyframes", fmt::format("{}", s.keyframes), fmt::format("{} landmarks", s.landmarks)));
+  tiles.push_back(Tile(
+      "lost", fmt::format("{} times", s.lost_count),
+      s.initialised_at.has_value() ? fmt::format("started at frame {}", *s.initialised_at) : "never started",
+      s.lost_count > 0 || !s.initialised_at.has_value() ? "wait" : ""));
   if (s.detection.has_value()) {
     tiles.push_back(Tile("keypoints in dynamic boxes", fmt::format("{:.1f}%", 100 * s.mean_dynamic_ratio),
                          fmt::format("mean; detector {}", s.detector)));
@@ -203,7 +206,7 @@ class FrameCharts {
 };
 
 Json ErrorChart(const Run& run, const std::string& title, const std::string& unit,
-                const std::vector<PoseError>& errors, double PoseError::* value, const char* colour) {
+                const std::vector<PoseError>& errors, double PoseError::*value, const char* colour) {
   Json times = Json::array(), values = Json::array();
   for (size_t i = 0; i < errors.size(); i += run.stride) {
     times.push_back(Rounded(run.Since(errors[i].timestamp_s), 4));
@@ -217,20 +220,26 @@ Json ErrorChart(const Run& run, const std::string& title, const std::string& uni
 }
 
 Json ChartsSection(const Run& run, const std::string& title, const std::string& note, Json charts) {
-  return {{"type", "charts"}, {"title", title}, {"note", note}, {"range", run.Range()}, {"charts", std::move(charts)}};
+  return {{"type", "charts"},
+          {"title", title},
+          {"note", note},
+          {"range", run.Range()},
+          {"charts", std::move(charts)}};
 }
 
 Json ErrorsSection(const Run& run) {
   Json charts = Json::array();
-  charts.push_back(ErrorChart(run, "APE, translation", "m", run.truth->ape.errors, &PoseError::translation_m, "c1"));
+  charts.push_back(
+      ErrorChart(run, "APE, translation", "m", run.truth->ape.errors, &PoseError::translation_m, "c1"));
   if (!run.relative.empty()) {
     charts.push_back(ErrorChart(run, "RPE, translation", "m", run.relative, &PoseError::translation_m, "c3"));
     charts.push_back(ErrorChart(run, "RPE, rotation", "deg", run.relative, &PoseError::rotation_deg, "c4"));
   }
-  return ChartsSection(run, "Errors",
-                       "Absolute (APE) after alignment by a similarity, and relative (RPE) from one frame with "
-                       "a pose to the next, as evo defines them.",
-                       std::move(charts));
+  return ChartsSection(
+      run, "Errors",
+      "Absolute (APE) after alignment by a similarity, and relative (RPE) from one frame with "
+      "a pose to the next, as evo defines them.",
+      std::move(charts));
 }
 
 Json KeypointsSection(const Run& run) {
@@ -240,11 +249,13 @@ Json KeypointsSection(const Run& run) {
       charts.Series("static", "c3", [](const Frame& f) { return f.dynamic.outside; }),
       charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.dynamic.kept; }),
       charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.dynamic.culled; })};
-  const Json inliers = {charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })};
-  return ChartsSection(run, "Keypoints",
-                       "Static ones lie in no box of a dynamic object. Of the dynamic ones, those are kept that "
-                       "move as what is at rest does.",
-                       {charts.Chart("Keypoints", "", "stack", stack), charts.Chart("Landmarks in use", "", "line", inliers)});
+  const Json inliers = {
+      charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })};
+  return ChartsSection(
+      run, "Keypoints",
+      "Static ones lie in no box of a dynamic object. Of the dynamic ones, those are kept that "
+      "move as what is at rest does.",
+      {charts.Chart("Keypoints", "", "stack", stack), charts.Chart("Landmarks in use", "", "line", inliers)});
 }
 
 Json MapSection(const Run& run) {
@@ -261,8 +272,10 @@ Json MapSection(const Run& run) {
 Json StagesSection(const Run& run) {
   Json rows = Json::array();
   const auto add = [&rows](const char* name, const TimeStatistics& ms) {
-    rows.push_back({{"name", name},
-                    {"values", {{{"v", Rounded(ms.median, 3)}, {"lo", Rounded(ms.median, 3)}, {"hi", Rounded(ms.p95, 3)}}}}});
+    rows.push_back(
+        {{"name", name},
+         {"values",
+          {{{"v", Rounded(ms.median, 3)}, {"lo", Rounded(ms.median, 3)}, {"hi", Rounded(ms.p95, 3)}}}}});
   };
   add("tracking, a frame", run.summary.tracking_ms);
   if (run.summary.detection.has_value()) {
@@ -282,9 +295,8 @@ Json StagesSection(const Run& run) {
 
 Json TrackingTimeSection(const Run& run) {
   const FrameCharts charts(run);
-  const Json series = {charts.Series("tracking", "c1", [](const RunSummary::FrameRecord& f) {
-    return Rounded(f.tracking_ms, 2);
-  })};
+  const Json series = {charts.Series(
+      "tracking", "c1", [](const RunSummary::FrameRecord& f) { return Rounded(f.tracking_ms, 2); })};
   return ChartsSection(run, "Time of the frames", "From the image in memory to its pose.",
                        {charts.Chart("Tracking", "ms", "line", series)});
 }
@@ -349,7 +361,8 @@ Json ConfigSection(const SystemOptions& options) {
   }
   return {{"type", "config"},
           {"title", "Configuration"},
-          {"note", changed.empty() ? "All options have their defaults." : "Options that differ from their defaults."},
+          {"note",
+           changed.empty() ? "All options have their defaults." : "Options that differ from their defaults."},
           {"changed", std::move(changed)},
           {"yaml", OptionsToYaml(options)}};
 }
@@ -398,7 +411,8 @@ nlohmann::ordered_json FramesSection(const std::vector<ChosenFrame>& frames, int
   for (const ChosenFrame& frame : frames) {
     cv::Mat picture = frame.picture;
     if (picture.cols > width_px) {
-      cv::resize(frame.picture, picture, {width_px, width_px * picture.rows / picture.cols}, 0, 0, cv::INTER_AREA);
+      cv::resize(frame.picture, picture, {width_px, width_px * picture.rows / picture.cols}, 0, 0,
+                 cv::INTER_AREA);
     }
     list.push_back({{"src", JpegDataUri(picture, kJpegQuality)},
                     {"caption", frame.caption},

@@ -17,7 +17,7 @@ struct RunRecord {
   std::optional<Trajectory> truth;
   std::vector<ChosenFrame> frames;
   // Objects that count, such as people and cars; true ones are known of some sequences only.
-  std::vector<BoxRecord> true_boxes, detected, compensated;
+  std::vector<BoxRecord> true_boxes = {}, detected = {}, compensated = {};
 };
 
 // To be called when the run has ended.

@@ -82,14 +82,13 @@ std::string TerminalText(const Table& table) {
 }
 
 std::string CsvText(const Table& table) {
-  std::string text;
-  for (size_t i = 0; i < table.columns.size(); ++i) {
-    text += (i > 0 ? "," : "") + CsvCell(Heading(table.columns[i]));
-  }
-  text += "\n";
+  std::vector<std::string> headings;
+  for (const Table::Column& column : table.columns) headings.push_back(CsvCell(Heading(column)));
+  std::string text = fmt::format("{}\n", fmt::join(headings, ","));
   for (const auto& row : table.rows) {
-    for (size_t i = 0; i < row.size(); ++i) text += (i > 0 ? "," : "") + CsvCell(row[i]);
-    text += "\n";
+    std::vector<std::string> cells;
+    for (const std::string& cell : row) cells.push_back(CsvCell(cell));
+    text += fmt::format("{}\n", fmt::join(cells, ","));
   }
   return text;
 }
@@ -109,8 +108,12 @@ nlohmann::ordered_json TableSection(const Table& table) {
   for (const Table::Column& column : table.columns) {
     columns.push_back({{"name", column.name}, {"group", column.group}, {"text", column.is_text}});
   }
-  return {{"type", "table"},   {"title", table.title},          {"short", table.title.substr(0, table.title.find(':'))},
-          {"note", table.note}, {"columns", std::move(columns)}, {"rows", table.rows}};
+  return {{"type", "table"},
+          {"title", table.title},
+          {"short", table.title.substr(0, table.title.find(':'))},
+          {"note", table.note},
+          {"columns", std::move(columns)},
+          {"rows", table.rows}};
 }
 
 Table TableOfRows(const std::string& title, const nlohmann::ordered_json& rows, int digits) {

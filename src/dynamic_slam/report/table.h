@@ -11,9 +11,9 @@ namespace dynamic_slam {
 struct Table {
   struct Column {
     std::string name;
-    std::string group = "";    // neighbours with the same group have a common heading
-    bool is_text = false;      // to the left
-    bool on_terminal = true;   // too wide a table is of no use there
+    std::string group = "";   // neighbours with the same group have a common heading
+    bool is_text = false;     // to the left
+    bool on_terminal = true;  // too wide a table is of no use there
   };
 
   std::string title, note;

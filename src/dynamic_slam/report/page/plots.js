@@ -262,7 +262,7 @@ function rampColour(share) {
 
 function colourBar(parent, scale) {
   const figure = element("figure", { class: "colour-bar" }, parent);
-  const label = `${scale.title} [${scale.unit}]`;
+  element("h3", {}, figure, `${scale.title} [${scale.unit}]`);
   drawing(figure, `Colours of the ${scale.title}`, 34, (svg, width) => {
     const left = 4, right = Math.min(width - 12, 520);
     for (let k = 0; k < BINS; ++k) {
@@ -273,9 +273,7 @@ function colourBar(parent, scale) {
       const x = left + ((value - scale.min) / (scale.max - scale.min || 1)) * (right - left);
       shape("text", { x, y: 27, "text-anchor": x < left + 12 ? "start" : x > right - 12 ? "end" : "middle" }, svg, short(value));
     }
-    if (width - right > 90) shape("text", { x: right + 14, y: 12 }, svg, label);
   });
-  return label;
 }
 
 // One view of the paths: two of the three axes, to scale.
@@ -325,7 +323,7 @@ function pathView(parent, section, view, height) {
     };
     if (truth) {
       shape("path", { d: line(truth, 0, truth[0].length - 1), stroke: colour("truth"), "stroke-width": 1.6,
-                      "stroke-dasharray": "1.5 4", class: "truth" }, inside);
+                      "stroke-dasharray": "1.5 4.5", class: "truth" }, inside);
     }
     for (const track of tracks) {
       const bins = new Map();

@@ -2,7 +2,7 @@
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const STATES = { tracking: "good", initialising: "wait", lost: "bad" };
-const EVENTS = { keyframe: ["c6", "keyframes"], start: ["good", "starts"], lost: ["bad", "lost"], reset: ["c4", "maps given up"],
+const EVENTS = { keyframe: ["c6", "keyframes"], start: ["good", "started or found again"], lost: ["bad", "lost"], reset: ["c4", "maps given up"],
                  loop: ["c1", "loops"], detector: ["c2", "detector late or failed"], skipped: ["c5", "images skipped"] };
 
 const draw = {
@@ -30,6 +30,8 @@ const draw = {
     const kinds = Object.keys(EVENTS).filter((kind) => section.events.some((e) => e[1] === kind));
     const items = legend(parent, kinds.map((kind) => ({ name: `${section.events.filter((e) => e[1] === kind).length} ${EVENTS[kind][1]}`,
                                                         colour: EVENTS[kind][0] })), false);
+    legend(parent, Object.keys(STATES).filter((state) => section.states.some((s) => s[2] === state))
+      .map((state) => ({ name: state, colour: STATES[state] })), true);
     const said = element("div", { class: "legend", "aria-live": "polite" }, parent);
     const row = 20, height = 34 + row * kinds.length + 26, range = section.range;
     const figure = element("figure", { class: "plot" }, parent);
@@ -69,7 +71,8 @@ const draw = {
   },
 
   charts(parent, section) {
-    for (const chart of section.charts) timeChart(parent, chart, section.range);
+    const box = section.charts.length === 2 ? element("div", { class: "pair" }, parent) : parent;
+    for (const chart of section.charts) timeChart(box, chart, section.range);
   },
 
   lines(parent, section) {
@@ -109,7 +112,7 @@ const draw = {
     const box = element("div", { class: "frames" }, parent);
     for (const frame of section.frames) {
       const figure = element("figure", {}, box);
-      element("img", { src: frame.src, alt: frame.caption, loading: "lazy", width: frame.width, height: frame.height, style: "height:auto" }, figure);
+      element("img", { src: frame.src, alt: frame.caption, width: frame.width, height: frame.height, style: "height:auto" }, figure);
       element("figcaption", {}, figure, frame.caption);
     }
   },
