@@ -153,7 +153,7 @@ std::vector<UnitOutcome> RunUnits(const fs::path& out, const std::vector<BenchUn
   }
   std::vector<std::unique_ptr<Worker>> workers;
   for (int i = 0; i < jobs; ++i) {
-    workers.push_back(std::make_unique<Worker>("bench"));
+    workers.push_back(std::make_unique<Worker>(TraceName("bench")));
     workers.back()->Post([&work](const std::stop_token&) { work(); });
   }
   for (const auto& worker : workers) worker->Drain();
