@@ -14,6 +14,9 @@
 #include "cmd_models.h"
 #include "cmd_run.h"
 #include "cmd_simulate.h"
+#ifdef DYNAMIC_SLAM_HAS_VIEWER
+#include "cmd_view.h"
+#endif
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/worker.h"
 
@@ -38,6 +41,9 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddDemoCommand(app, &exit_code);
   dynamic_slam::AddBenchCommand(app, &exit_code);
   dynamic_slam::AddConfigCommand(app);
+#ifdef DYNAMIC_SLAM_HAS_VIEWER
+  dynamic_slam::AddViewCommand(app);
+#endif
   try {
     app.parse(argc, argv);  // runs the subcommand
     return exit_code;

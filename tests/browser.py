@@ -14,9 +14,10 @@ def find_chromium():
 
 
 class Page:
-    """A page of a file. What it logs and throws is in `problems`."""
+    """A page of a file, or of an address of this machine. What it logs and throws is in `problems`."""
 
-    def __init__(self, file, width=1280, height=900, dark=False):
+    def __init__(self, address, width=1280, height=900, dark=False):
+        self.own = address if address.startswith("http:") else "file:"
         self.profile = tempfile.mkdtemp()
         from_us, to_browser = os.pipe()
         from_browser, to_us = os.pipe()
@@ -27,7 +28,7 @@ class Page:
             os.dup2(high, 4)
 
         self.browser = subprocess.Popen(
-            [find_chromium(), "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+            [find_chromium(), "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run",
              "--disable-background-networking", "--hide-scrollbars", "--user-data-dir=" + self.profile,
              "--remote-debugging-pipe", "about:blank"],
             preexec_fn=take_pipes, pass_fds=(3, 4), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -41,7 +42,7 @@ class Page:
             self.call(domain + ".enable")
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
         self.resize(width, height)
-        self.call("Page.navigate", url="file://" + os.path.abspath(file))
+        self.call("Page.navigate", url=address if address.startswith("http:") else "file://" + os.path.abspath(address))
         self.wait_for("document.readyState === 'complete'")
 
     def close(self):
@@ -91,7 +92,8 @@ class Page:
             self.problems.append(parameters["entry"]["text"])
         elif method == "Network.requestWillBeSent":
             address = parameters["request"]["url"]
-            if not address.startswith(("file:", "data:", "about:")):
+            own = self.own.split("?")[0]
+            if not address.startswith((own, "blob:" + own, "data:", "about:")):
                 self.problems.append("asks the network for " + address)
 
     def evaluate(self, expression):

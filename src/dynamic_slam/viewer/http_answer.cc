@@ -19,7 +19,8 @@ std::string_view View(boost::beast::string_view text) { return {text.data(), tex
 std::string_view HostName(std::string_view host) {
   const size_t colon = host.rfind(':');
   const size_t bracket = host.rfind(']');
-  const bool has_port = colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket);
+  const bool has_port =
+      colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket);
   if (has_port) host = host.substr(0, colon);
   if (host.size() >= 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   return host;
@@ -33,7 +34,8 @@ bool IsSame(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-HttpResponse Basic(const HttpRequest& request, http::status status, std::string_view type, std::string_view text) {
+HttpResponse Basic(const HttpRequest& request, http::status status, std::string_view type,
+                   std::string_view text) {
   HttpResponse response(status, request.version());
   response.set(http::field::content_type, boost::beast::string_view(type.data(), type.size()));
   response.set(http::field::cache_control, "no-cache");
@@ -62,7 +64,8 @@ std::string_view TokenOf(std::string_view target) {
   return "";
 }
 
-std::string Refusal(const HttpRequest& request, std::string_view address, std::string_view token, bool is_websocket) {
+std::string Refusal(const HttpRequest& request, std::string_view address, std::string_view token,
+                    bool is_websocket) {
   const std::string_view host = View(request[http::field::host]);
   if (token.empty()) {
     const std::string_view name = HostName(host);

@@ -21,7 +21,8 @@ constexpr int kMapShare = 30;  // the copy of the map takes at most this fractio
 constexpr int kImageWidthPx = 640;
 constexpr int kJpegQuality = 75;
 constexpr size_t kEvents = 200;
-constexpr uint32_t kWholeMapEvery = 150;  // frames of a recording, so that seeking need not begin at the start
+constexpr uint32_t kWholeMapEvery =
+    150;  // frames of a recording, so that seeking need not begin at the start
 
 std::string EncodeJpeg(const cv::Mat& picture) {
   cv::Mat small = picture;
@@ -48,18 +49,19 @@ uint16_t KindOf(const Frame& frame, size_t keypoint) {
 
 }  // namespace
 
-LiveView::LiveView(const LiveViewOptions& options, const Camera& raw_camera, const ImageOptions& image, RunMode mode)
-    : mode_(mode), preparer_(raw_camera, image) {
+LiveView::LiveView(const LiveViewOptions& options, const Camera& raw_camera, const ImageOptions& image,
+                   RunMode mode)
+    : mode_(mode), preparer_(raw_camera, image), frames_since_whole_map_(kWholeMapEvery) {
   const Camera& camera = preparer_.camera();
-  hello_ = {{"mode", "live"},         {"run", Name(mode)},        {"source", options.source},
-            {"width", camera.width},  {"height", camera.height},  {"fx", camera.fx},
-            {"fy", camera.fy},        {"cx", camera.cx},          {"cy", camera.cy}};
+  hello_ = {{"mode", "live"},        {"run", Name(mode)},       {"source", options.source},
+            {"width", camera.width}, {"height", camera.height}, {"fx", camera.fx},
+            {"fy", camera.fy},       {"cx", camera.cx},         {"cy", camera.cy}};
   if (!options.recording.empty()) {
     recording_.emplace(options.recording);
     recording_->Add(0, JsonMessage(MessageType::kHello, 0, hello_));
   }
   if (options.server.has_value()) {
-    server_.emplace(*options.server, this);
+    server_.emplace(*options.server, static_cast<Show*>(this));
     server_->Start();
   }
 }
@@ -219,7 +221,7 @@ void LiveView::Send(Picture picture, bool must_arrive) {
   picture.events = std::exchange(events_, {});
   ++on_the_way_;
   server_->Post([this, picture = std::make_shared<Picture>(std::move(picture))] {
-    Take(std::move(*picture));
+    TakeForServer(std::move(*picture));
     {
       MutexLock lock(mutex_);
       --on_the_way_;
@@ -251,10 +253,13 @@ void LiveView::Take(Picture picture) {
 
 void LiveView::Emit(const Message& message) {
   if (server_.has_value()) server_->Broadcast(message);
-  if (!recording_.has_value()) return;
+  if (recording_.has_value()) recording_->Add(shown_.timestamp_s, message);
+}
+
+void LiveView::TakeForServer(Picture picture) {
   try {
-    recording_->Add(shown_.timestamp_s, message);
-  } catch (...) {
+    Take(std::move(picture));
+  } catch (...) {  // a full disk ends the recording, not the run
     recording_.reset();
     MutexLock lock(mutex_);
     failure_ = std::current_exception();
@@ -329,32 +334,39 @@ void LiveView::WasReset() {
   Tell("info", "Everything was forgotten, as was wished");
   Picture picture;
   picture.map.emplace();
-  picture.facts = {{"time", timestamp_s_}, {"state", Name(state_)}, {"reason", "reset"}, {"boxes", nlohmann::json::array()}};
+  picture.facts = {{"time", timestamp_s_},
+                   {"state", Name(state_)},
+                   {"reason", "reset"},
+                   {"boxes", nlohmann::json::array()}};
   Send(std::move(picture), true);
+}
+
+void LiveView::ShowEvents() { SendAgain(std::nullopt); }
+
+void LiveView::SendAgain(std::optional<MapPicture> map) {
+  auto change = [this, map = std::make_shared<std::optional<MapPicture>>(std::move(map)),
+                 events = std::exchange(events_, {})] {
+    Picture last = shown_;
+    last.events = events;
+    last.map = std::move(*map);
+    TakeForServer(std::move(last));
+  };
+  if (server_.has_value()) {
+    server_->Post(std::move(change));
+  } else {
+    change();
+  }
 }
 
 void LiveView::Finish(const SlamSystem& system) {
   Tell("info", "The run has ended");
-  Picture picture;
+  std::optional<MapPicture> map;
   {
     const auto now = system.map().Read();
-    picture.map = PictureOf(*now, path_);
+    map = PictureOf(*now, path_);
   }
-  if (server_.has_value()) {
-    // The last frame stays; only the map changes.
-    server_->Post([this, events = std::exchange(events_, {}), map = std::make_shared<MapPicture>(std::move(*picture.map))] {
-      Picture last = shown_;
-      last.events = events;
-      last.map = std::move(*map);
-      Take(std::move(last));
-    });
-    server_->Flush(std::chrono::milliseconds(1000));
-  } else {
-    Picture last = shown_;
-    last.events = std::exchange(events_, {});
-    last.map = std::move(picture.map);
-    Take(std::move(last));
-  }
+  SendAgain(std::move(map));
+  if (server_.has_value()) server_->Flush(std::chrono::milliseconds(1000));
   MutexLock lock(mutex_);
   if (failure_ != nullptr) std::rethrow_exception(failure_);
 }

@@ -30,8 +30,8 @@ struct RunWishes {
   bool saves_map = false, resets = false;
 };
 
-// Shows a run to browsers, and records it. What it costs tracking's thread is a copy of what is shown; all else is
-// done in the server's thread.
+// Shows a run to browsers, and records it. What it costs tracking's thread is a copy of what is shown; all
+// else is done in the server's thread.
 class LiveView : private Show {
  public:
   // raw_camera, image: of the images that are shown. Throws InputError.
@@ -40,16 +40,19 @@ class LiveView : private Show {
 
   std::string url() const { return server_.has_value() ? server_->url() : ""; }
 
-  // To be called after each frame, by tracking's thread. In offline mode waits for a recording to be written; in
-  // realtime mode for nothing: of frames that come too fast some are not shown.
+  // To be called after each frame, by tracking's thread. In offline mode waits for a recording to be written;
+  // in realtime mode for nothing: of frames that come too fast some are not shown.
   void Watch(const RunProgress& progress, const SlamSystem& system);
 
-  // Waits while a browser has it paused, and `should_stop` does not say so; then what was wished since the last
-  // call.
+  // Waits while a browser has it paused, and `should_stop` does not say so; then what was wished since the
+  // last call.
   RunWishes WaitForWishes(const std::function<bool()>& should_stop);
 
   // A line for the list of events; kind is "good", "bad" or "info".
   void Tell(const std::string& kind, const std::string& text);
+
+  // Shows what was told since the last frame, when there is no new one yet.
+  void ShowEvents();
 
   // The map and the path were forgotten.
   void WasReset();
@@ -83,9 +86,12 @@ class LiveView : private Show {
   void FollowPath(const RunProgress& progress);
   std::optional<MapPicture> MapIfDue(const SharedMap& map, bool at_once);
   void Send(Picture picture, bool must_arrive);
+  // The last frame again, with the events since and maybe another map.
+  void SendAgain(std::optional<MapPicture> map);
 
   // Of the server's thread, or, without one, of tracking's.
   void Take(Picture picture);
+  void TakeForServer(Picture picture);
   void Emit(const Message& message);
   Message FrameMessage();
   Message Player();
@@ -112,7 +118,7 @@ class LiveView : private Show {
   Picture shown_;
   MapPicture map_;
   std::deque<Message> told_events_;
-  uint32_t frames_since_whole_map_ = 0;
+  uint32_t frames_since_whole_map_;
 
   std::atomic<int> on_the_way_ = 0;  // pictures that the server has not taken yet
   mutable Mutex mutex_;
@@ -120,8 +126,8 @@ class LiveView : private Show {
   bool is_paused_ DS_GUARDED_BY(mutex_) = false;
   bool steps_ DS_GUARDED_BY(mutex_) = false;
   RunWishes wishes_ DS_GUARDED_BY(mutex_);
-  std::string failure_ DS_GUARDED_BY(mutex_);  // of the recording
-  std::optional<ViewerServer> server_;          // last: its thread uses all the others
+  std::exception_ptr failure_ DS_GUARDED_BY(mutex_);  // of the recording
+  std::optional<ViewerServer> server_;                // last: its thread uses all the others
 };
 
 }  // namespace dynamic_slam

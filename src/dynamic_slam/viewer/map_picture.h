@@ -17,8 +17,8 @@ struct PathFrame {
   uint32_t stretch = 0;
 };
 
-// What is shown of a map, as values: it can be looked at without the map's lock. Positions are in the world of
-// their part.
+// What is shown of a map, as values: it can be looked at without the map's lock. Positions are in the world
+// of their part.
 struct MapPicture {
   struct Point {
     uint32_t id;

@@ -25,7 +25,8 @@ static_assert(sizeof(Prefix) == 16);
 RecordingWriter::RecordingWriter(std::filesystem::path file)
     : file_(std::move(file)), stream_(file_, std::ios::binary) {
   stream_.write(kMagic.data(), kMagic.size());
-  if (!stream_.flush()) throw InputError(file_.string(), "cannot be written", "Check the folder and its rights.");
+  if (!stream_.flush())
+    throw InputError(file_.string(), "cannot be written", "Check the folder and its rights.");
 }
 
 void RecordingWriter::Add(double timestamp_s, const Message& message) {
@@ -37,7 +38,8 @@ void RecordingWriter::Add(double timestamp_s, const Message& message) {
 
 RecordingReader::RecordingReader(const std::filesystem::path& file)
     : name_(file.string()), stream_(file, std::ios::binary) {
-  if (!stream_) throw InputError(name_, "there is no recording", "Make one with `dynamic_slam run ... --record`.");
+  if (!stream_)
+    throw InputError(name_, "there is no recording", "Make one with `dynamic_slam run ... --record`.");
   stream_.seekg(0, std::ios::end);
   const auto size = static_cast<uint64_t>(stream_.tellg());
   stream_.seekg(0);

@@ -7,7 +7,9 @@
 namespace dynamic_slam {
 namespace {
 
-bool IsWholeMap(const MessageHeader& header) { return header.type == MessageType::kMap && header.detail == 1; }
+bool IsWholeMap(const MessageHeader& header) {
+  return header.type == MessageType::kMap && header.detail == 1;
+}
 
 }  // namespace
 
@@ -21,7 +23,8 @@ Message Replay::Hello() {
   const Message told = recording_.Read(0);
   // As MessageWriter::AddJson wrote it; what is no JSON becomes nothing.
   const size_t start = std::min(told->size(), kMessageHeaderBytes + sizeof(uint32_t));
-  nlohmann::json hello = nlohmann::json::parse(told->begin() + static_cast<ptrdiff_t>(start), told->end(), nullptr, false);
+  nlohmann::json hello =
+      nlohmann::json::parse(told->begin() + static_cast<ptrdiff_t>(start), told->end(), nullptr, false);
   if (!hello.is_object()) hello = nlohmann::json::object();
   hello["mode"] = "replay";
   nlohmann::json& states = hello["states"] = nlohmann::json::array();
@@ -44,7 +47,8 @@ std::vector<Message> Replay::Backlog() {
   }
   for (size_t i = 0; i < now; ++i) {
     const MessageType type = entries[i].header.type;
-    if (type == MessageType::kEvent || (type == MessageType::kMap && i >= whole)) messages.push_back(recording_.Read(i));
+    if (type == MessageType::kEvent || (type == MessageType::kMap && i >= whole))
+      messages.push_back(recording_.Read(i));
   }
   messages.push_back(recording_.Read(now));
   messages.push_back(Player());
@@ -72,7 +76,9 @@ void Replay::SeekTo(size_t frame) {
 
 void Replay::PlayOn() {
   if (!is_playing_ || position_ + 1 >= recording_.frames().size()) return;
-  const auto stamp = [this](size_t frame) { return recording_.entries()[recording_.frames()[frame]].timestamp_s; };
+  const auto stamp = [this](size_t frame) {
+    return recording_.entries()[recording_.frames()[frame]].timestamp_s;
+  };
   const double pause_s = std::clamp((stamp(position_ + 1) - stamp(position_)) / speed_, 0.005, 1.0);
   server_.PostAfter(std::chrono::milliseconds(static_cast<int>(1000 * pause_s)), [this, turn = turn_] {
     if (turn != turn_) return;

@@ -33,7 +33,7 @@ class Replay : private Show {
   size_t position_ = 0;  // among the frames
   bool is_playing_ = true;
   double speed_ = 1;
-  unsigned turn_ = 0;  // counts wishes: a timer of before does nothing
+  unsigned turn_ = 0;    // counts wishes: a timer of before does nothing
   ViewerServer server_;  // last: its thread uses all the others
 };
 

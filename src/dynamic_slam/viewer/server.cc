@@ -27,11 +27,11 @@ using boost::system::error_code;
 using tcp = asio::ip::tcp;
 
 // Bounds on what anybody can make us do.
-constexpr int kMaxConnections = 64;          // of all kinds, at a time
-constexpr size_t kMaxBrowsers = 16;          // of these, with a WebSocket
-constexpr uint32_t kMaxHeaderBytes = 8192;   // of a request
-constexpr uint64_t kMaxBodyBytes = 1024;     // of a request
-constexpr size_t kMaxCommandBytes = 256;     // of a message over the WebSocket
+constexpr int kMaxConnections = 64;           // of all kinds, at a time
+constexpr size_t kMaxBrowsers = 16;           // of these, with a WebSocket
+constexpr uint32_t kMaxHeaderBytes = 8192;    // of a request
+constexpr uint64_t kMaxBodyBytes = 1024;      // of a request
+constexpr size_t kMaxCommandBytes = 256;      // of a message over the WebSocket
 constexpr std::chrono::seconds kPatience(5);  // for a request or an answer
 constexpr std::chrono::seconds kSilence(30);  // of a browser, which answers pings
 constexpr size_t kMaxWaitingBytes = 4 << 20;  // to one browser, beside what is being written
@@ -243,9 +243,10 @@ class ViewerServer::Impl {
       parser_->header_limit(kMaxHeaderBytes);
       parser_->body_limit(kMaxBodyBytes);
       stream_.expires_after(kPatience);  // for the whole request, however slowly it drips
-      http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](const error_code& error, size_t) {
-        if (!error) self->Reply(self->parser_->get());
-      });
+      http::async_read(stream_, buffer_, *parser_,
+                       [self = shared_from_this()](const error_code& error, size_t) {
+                         if (!error) self->Reply(self->parser_->get());
+                       });
     }
 
    private:
@@ -303,9 +304,10 @@ class ViewerServer::Impl {
     then([&] { acceptor_.bind(wanted, error); });
     then([&] { acceptor_.listen(kMaxConnections, error); });
     if (error) {
-      throw InputError("--viewer", fmt::format("cannot listen at {} port {}: {}", options_.address, options_.port,
-                                               error.message()),
-                       "Give another port, or 0 for any that is free.");
+      throw InputError(
+          "--viewer",
+          fmt::format("cannot listen at {} port {}: {}", options_.address, options_.port, error.message()),
+          "Give another port, or 0 for any that is free.");
     }
     endpoint_ = acceptor_.local_endpoint();
   }

@@ -54,7 +54,8 @@ class ViewerServer {
   void Post(std::function<void()> task);
   void PostAfter(std::chrono::milliseconds delay, std::function<void()> task);
 
-  // In the server's thread: a message to all browsers, or to each of them the backlog instead of all that waits.
+  // In the server's thread: a message to all browsers, or to each of them the backlog instead of all that
+  // waits.
   void Broadcast(const Message& message);
   void Refresh();
   bool HasBrowsers() const;

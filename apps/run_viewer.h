@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "dynamic_slam/viewer/live_view.h"
+
+namespace dynamic_slam {
+
+struct ViewerArguments {
+  std::optional<uint16_t> port;  // none: no viewer
+  std::string address = "127.0.0.1";
+  bool is_recorded = false;
+
+  bool IsWanted() const { return port.has_value() || is_recorded; }
+};
+
+// --viewer-address, and the port under the name that is given.
+void AddServerOptions(CLI::App* command, const std::string& port_option, ViewerArguments* arguments);
+
+// Where a viewer listens; with a token unless only this machine can reach it.
+ServerOptions ServerOptionsOf(const ViewerArguments& arguments);
+
+// Shows and records a run, and does what browsers wish of it.
+class RunViewer {
+ public:
+  RunViewer(const ViewerArguments& arguments, std::filesystem::path out, const std::string& source,
+            const Camera& raw_camera, const SystemOptions& options, RunMode mode);
+
+  // To be called last after each frame: returns when the run goes on.
+  void Watch(const RunProgress& progress, SlamSystem* system, const std::function<bool()>& should_stop);
+
+  void Finish(const SlamSystem& system) { view_.Finish(system); }
+
+ private:
+  std::filesystem::path out_;
+  LiveView view_;
+};
+
+}  // namespace dynamic_slam

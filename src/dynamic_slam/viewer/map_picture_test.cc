@@ -1,0 +1,3 @@
+#include "dynamic_slam/viewer/map_picture.h"
+
+#include <gtest/gtest.h>

@@ -1,0 +1,3 @@
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/viewer/map_picture.h"
