@@ -78,6 +78,7 @@ class LiveView : private Show {
 
   std::vector<Message> Backlog() override;
   void OnCommand(std::string_view command) override;
+  void OnNobodyWatches() override { OnCommand("resume"); }  // nobody is left to do it
 
   // Of tracking's thread.
   nlohmann::json FactsOf(const RunProgress& progress, const SlamSystem& system);

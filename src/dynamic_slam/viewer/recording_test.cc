@@ -1,3 +1,52 @@
+#include "dynamic_slam/viewer/recording.h"
+
 #include <gtest/gtest.h>
 
-#include "dynamic_slam/viewer/map_picture.h"
+#include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/test_folder.h"
+
+namespace dynamic_slam {
+namespace {
+
+Message Frame(uint32_t frame) { return MessageWriter({MessageType::kFrame, frame, 1}).Finish(); }
+
+TEST(RecordingTest, IsReadAsItWasWritten) {
+  const TestFolder folder;
+  const std::filesystem::path file = folder.path() / kRecordingName;
+  {
+    RecordingWriter writer(file);
+    writer.Add(0, JsonMessage(MessageType::kHello, 0, {{"source", "here"}}));
+    for (uint32_t i = 0; i < 5; ++i) writer.Add(0.5 * i, Frame(i));
+  }
+  RecordingReader reader(file);
+  ASSERT_EQ(reader.frames().size(), 5u);
+  const RecordingReader::Entry& last = reader.entries()[reader.frames()[4]];
+  EXPECT_EQ(last.header.frame, 4u);
+  EXPECT_EQ(last.timestamp_s, 2.0);
+  EXPECT_EQ(*reader.Read(reader.frames()[2]), *Frame(2));
+}
+
+TEST(RecordingTest, WhereverItEndsTheFramesBeforeAreThere) {
+  const TestFolder folder;
+  const std::filesystem::path file = folder.path() / kRecordingName;
+  {
+    RecordingWriter writer(file);
+    writer.Add(0, JsonMessage(MessageType::kHello, 0, {}));
+    for (uint32_t i = 0; i < 3; ++i) writer.Add(i, Frame(i));
+  }
+  size_t most = 3;
+  for (auto bytes = static_cast<int64_t>(std::filesystem::file_size(file)); bytes >= 0; --bytes) {
+    std::filesystem::resize_file(file, static_cast<uintmax_t>(bytes));
+    size_t frames = 0;
+    try {
+      frames = RecordingReader(file).frames().size();
+    } catch (const InputError&) {
+    }
+    EXPECT_LE(frames, most);
+    most = frames;
+  }
+  EXPECT_EQ(most, 0u);
+}
+
+}  // namespace
+}  // namespace dynamic_slam

@@ -34,6 +34,7 @@ constexpr uint64_t kMaxBodyBytes = 1024;      // of a request
 constexpr size_t kMaxCommandBytes = 256;      // of a message over the WebSocket
 constexpr std::chrono::seconds kPatience(5);  // for a request or an answer
 constexpr std::chrono::seconds kSilence(30);  // of a browser, which answers pings
+constexpr std::chrono::seconds kAbsence(5);   // after which nobody is said to watch
 constexpr size_t kMaxWaitingBytes = 4 << 20;  // to one browser, beside what is being written
 
 std::string RandomToken() {
@@ -216,7 +217,7 @@ class ViewerServer::Impl {
     }
 
     void End() {
-      std::erase(server_->browsers_, shared_from_this());
+      if (std::erase(server_->browsers_, shared_from_this()) > 0) server_->NoteLeaving();
       beast::close_socket(beast::get_lowest_layer(stream_));
     }
 
@@ -288,6 +289,13 @@ class ViewerServer::Impl {
     HttpResponse response_;
   };
 
+  // A page that is loaded again is away for a moment.
+  void NoteLeaving() {
+    PostAfter(kAbsence, [this] {
+      if (browsers_.empty()) show_->OnNobodyWatches();
+    });
+  }
+
   void Listen() {
     error_code error;
     const asio::ip::address address = asio::ip::make_address(options_.address, error);
@@ -328,8 +336,8 @@ class ViewerServer::Impl {
   Show* const show_;
   std::string token_;
   int connections_ = 0;
-  std::vector<std::shared_ptr<Browser>> browsers_;
   asio::io_context io_{1};
+  std::vector<std::shared_ptr<Browser>> browsers_;  // go before what their sockets belong to
   tcp::acceptor acceptor_;
   tcp::endpoint endpoint_;
   Worker worker_;  // last: its thread uses all the others

@@ -22,6 +22,9 @@ class Show {
 
   // What a browser wishes, such as "pause". Anybody may have sent it.
   virtual void OnCommand(std::string_view command) = 0;
+
+  // The last browser has been gone for a while.
+  virtual void OnNobodyWatches() {}
 };
 
 struct ServerOptions {

@@ -18,11 +18,15 @@ const POINT_VERTEX = `
     colour = mix(colour, vec3(0.45, 1.0, 0.65), youth);
     if (died >= 0.0) colour = vec3(1.0, 0.3, 0.25);
     tint = vec4(colour, (0.35 + 0.65 * (1.0 - youth)) * (1.0 - death));
-    gl_PointSize = clamp(pixels * 3.2 / -seen.z, 1.6 * pixels, 5.0 * pixels) * (1.0 + youth);
+    gl_PointSize = clamp(pixels * 5.0 / -seen.z, 2.0 * pixels, 7.0 * pixels) * (1.0 + youth);
   }`;
 const POINT_FRAGMENT = `
   varying vec4 tint;
-  void main() { if (tint.a < 0.02) discard; gl_FragColor = tint; }`;
+  void main() {
+    vec2 off = gl_PointCoord - 0.5;
+    if (tint.a < 0.02 || dot(off, off) > 0.25) discard;
+    gl_FragColor = tint;
+  }`;
 
 // Landmarks: each has a place in the arrays until it has faded away.
 class Points {
@@ -135,7 +139,7 @@ class MapView {
     this.eye.position.set(0, 1.2, 2.4);
     this.control = new THREE.OrbitControls(this.eye, canvas);
     this.control.addEventListener("change", () => this.redraw());
-    this.control.addEventListener("start", () => this.onTouch && this.onTouch());
+    this.control.addEventListener("start", () => { this.chases = false; });
     this.points = new Points(this.world);
     this.edges = makeLines(this.world, COLOURS.edge, 0.45);
     this.keyframeLines = makeLines(this.world, COLOURS.keyframe, 0.9);
@@ -245,15 +249,16 @@ class MapView {
 
   centre(pose) { return new THREE.Vector3(pose[0], -pose[1], -pose[2]); }
 
-  // Moves the eye along with the camera; the first time it is put behind it.
+  // Keeps the eye behind the camera, softly; once the user has turned the view, it only goes along.
   follow(last) {
-    const centre = this.centre(this.pose);
-    if (!this.placed) {
-      const turn = new THREE.Quaternion(this.pose[3], this.pose[4], this.pose[5], this.pose[6]);
-      const ahead = new THREE.Vector3(0, 0, 1).applyQuaternion(turn);
-      ahead.set(ahead.x, -ahead.y, -ahead.z);
-      this.control.target.copy(centre).addScaledVector(ahead, 0.45);
-      this.eye.position.copy(centre).addScaledVector(ahead, -1.15).add(new THREE.Vector3(0, 0.75, 0));
+    const centre = this.centre(this.pose), turn = new THREE.Quaternion(this.pose[3], this.pose[4], this.pose[5], this.pose[6]);
+    const ahead = new THREE.Vector3(0, 0, 1).applyQuaternion(turn);
+    ahead.set(ahead.x, -ahead.y, -ahead.z);
+    if (!this.placed || this.chases) {
+      const share = this.placed ? 0.1 : 1;
+      this.control.target.lerp(centre.clone().addScaledVector(ahead, 0.45), share);
+      this.eye.position.lerp(centre.clone().addScaledVector(ahead, -1.15).add(new THREE.Vector3(0, 0.75, 0)), share);
+      this.chases = this.placed ? this.chases : true;
       this.placed = true;
     } else if (last) {
       const step = centre.sub(this.centre(last));

@@ -38,6 +38,7 @@ function onHello(hello) {
   if (page.map) {
     page.map.camera = hello;
     if (page.known !== hello.source) page.map.clear();
+    if (page.map.chases) page.map.placed = false;  // after a jump, at once
     page.map.loops.splice(0).forEach((loop) => page.map.world.remove(loop.tube));
   }
   if (page.known !== hello.source || $("video-canvas").width !== hello.width) page.video.setSize(hello.width, hello.height);

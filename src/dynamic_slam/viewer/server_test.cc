@@ -1,3 +1,0 @@
-#include <gtest/gtest.h>
-
-#include "dynamic_slam/viewer/map_picture.h"
