@@ -8,11 +8,12 @@
 namespace dynamic_slam {
 namespace {
 
+class RecordingTest : public FolderTest {};
+
 Message Frame(uint32_t frame) { return MessageWriter({MessageType::kFrame, frame, 1}).Finish(); }
 
-TEST(RecordingTest, IsReadAsItWasWritten) {
-  const TestFolder folder;
-  const std::filesystem::path file = folder.path() / kRecordingName;
+TEST_F(RecordingTest, IsReadAsItWasWritten) {
+  const std::filesystem::path file = folder_ / kRecordingName;
   {
     RecordingWriter writer(file);
     writer.Add(0, JsonMessage(MessageType::kHello, 0, {{"source", "here"}}));
@@ -26,9 +27,8 @@ TEST(RecordingTest, IsReadAsItWasWritten) {
   EXPECT_EQ(*reader.Read(reader.frames()[2]), *Frame(2));
 }
 
-TEST(RecordingTest, WhereverItEndsTheFramesBeforeAreThere) {
-  const TestFolder folder;
-  const std::filesystem::path file = folder.path() / kRecordingName;
+TEST_F(RecordingTest, WhereverItEndsTheFramesBeforeAreThere) {
+  const std::filesystem::path file = folder_ / kRecordingName;
   {
     RecordingWriter writer(file);
     writer.Add(0, JsonMessage(MessageType::kHello, 0, {}));
