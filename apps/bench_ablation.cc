@@ -138,6 +138,7 @@ void RunAblation(const BenchArguments& arguments, int* exit_code) {
   PrintOutcomes(outcomes);
   if (!arguments.out.empty()) {
     WriteRows(arguments.out, "ablation", ToRows(outcomes));
+    WriteBenchReport(arguments.out, "Ablation", arguments, ToRows(outcomes), {});
     fmt::print("results: {}\n", arguments.out);
   }
   if (console.ShouldStop()) *exit_code = kExitInterrupted;

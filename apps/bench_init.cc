@@ -164,6 +164,11 @@ void RunInit(const InitArguments& arguments, int* exit_code) {
                                   {"without", {{"good_starts", kPaperWithout}}}}},
                                 {"starts", rows}});
   WritePicture((out / "init.png").string(), DrawStarts(starts));
+  std::vector<CurvePlot> plots;
+  for (const bool fixed : {false, true}) {
+    for (const bool semantics : {true, false}) plots.push_back(PlotStarts(starts, fixed, semantics));
+  }
+  WriteBenchReport(out, "Starts before somebody who moves", arguments, rows, plots);
   fmt::print("\n{:<24}{:>26}{:>28}\n", "", "good starts, camera sways", "no false start, it is fixed");
   for (const bool semantics : {true, false}) {
     fmt::print("{:<24}{:>26}{:>28}\n", semantics ? "with semantics" : "without",

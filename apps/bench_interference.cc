@@ -201,6 +201,7 @@ void RunInterference(const InterferenceArguments& arguments, int* exit_code) {
   PrepareOutputFolder(out);
   RunConsole console(arguments.quiet);
   nlohmann::ordered_json rows = nlohmann::ordered_json::array(), frames = nlohmann::ordered_json::array();
+  std::vector<CurvePlot> plots;  // of the first scene
   const SceneOptions scene = LoadScene(arguments.scene);
   for (uint64_t seed = scene.seed; seed < scene.seed + static_cast<uint64_t>(arguments.seeds); ++seed) {
     SceneOptions options = scene;
@@ -217,6 +218,8 @@ void RunInterference(const InterferenceArguments& arguments, int* exit_code) {
     if (rows.empty()) {
       fmt::print("{:<6}{:<10}{:>10}{:>10}{:>11}{:>14}{:>13}\n", "seed", "semantics", "coverage", "APE/path",
                  "on people", "m/s in motion", "m/s at rest");
+      plots = {PlotCounts(with, options.camera),
+               PlotSpeeds(simulation.truth(), with, without, options.camera)};
       WritePicture((out / "interference.png").string(),
                    DrawInterference(simulation.truth(), with, without, options.camera));
     }
@@ -235,6 +238,7 @@ void RunInterference(const InterferenceArguments& arguments, int* exit_code) {
     }
   }
   WriteCsv(out / "interference.csv", rows);
+  WriteBenchReport(out, "People always in view", arguments, rows, plots);
   WriteCsv(out / "interference_frames.csv", frames);
   WriteJson(out / "interference.json", {{"detector", arguments.detector},
                                         {"runs", rows},

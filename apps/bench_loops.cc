@@ -191,7 +191,8 @@ void Print(const std::vector<Outcome>& outcomes) {
   }
 }
 
-void WriteOutcomes(const std::filesystem::path& folder, const std::vector<Outcome>& outcomes) {
+void WriteOutcomes(const LoopsArguments& arguments, const std::vector<Outcome>& outcomes) {
+  const std::filesystem::path folder = arguments.out;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array(), points = nlohmann::ordered_json::array();
   CurvePlot plot{"Places known again, before geometry is asked", "recall", "precision", {}, 1, 1};
   for (const Outcome& outcome : outcomes) {
@@ -210,6 +211,7 @@ void WriteOutcomes(const std::filesystem::path& folder, const std::vector<Outcom
   WriteRows(folder, "loops", rows);
   WriteRows(folder, "places", points);
   WriteCurves(folder, "places", plot);
+  WriteBenchReport(folder, "Loops", arguments, rows, {plot});
 }
 
 void RunLoops(const LoopsArguments& arguments, int* exit_code) {
@@ -226,7 +228,7 @@ void RunLoops(const LoopsArguments& arguments, int* exit_code) {
   }
   Print(outcomes);
   if (!arguments.out.empty()) {
-    WriteOutcomes(arguments.out, outcomes);
+    WriteOutcomes(arguments, outcomes);
     fmt::print("results: {}\n", arguments.out);
   }
   if (console.ShouldStop()) *exit_code = kExitInterrupted;

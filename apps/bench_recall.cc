@@ -32,9 +32,7 @@ struct RecallOfFrame {
   DetectionMetrics before, after;
 };
 
-std::vector<RecallOfFrame> RecallByFrame(const std::string& sequence, const ExperimentRun& run) {
-  std::vector<double> stamps_s;
-  for (const RunSummary::FrameRecord& frame : run.summary.frames) stamps_s.push_back(frame.timestamp_s);
+std::vector<RecallOfFrame> RecallByFrame(const ExperimentRun& run) {
   const auto by_stamp = [](const std::vector<BoxRecord>& records) {
     std::map<int64_t, std::vector<BoxRecord>> sorted;
     for (const BoxRecord& record : records) {
@@ -42,12 +40,12 @@ std::vector<RecallOfFrame> RecallByFrame(const std::string& sequence, const Expe
     }
     return sorted;
   };
-  auto truth = by_stamp(TrueMovers(sequence, stamps_s)), detected = by_stamp(run.detected),
-       compensated = by_stamp(run.compensated);
+  auto truth = by_stamp(run.record.true_boxes), detected = by_stamp(run.record.detected),
+       compensated = by_stamp(run.record.compensated);
   std::vector<RecallOfFrame> frames;
-  for (const double stamp_s : stamps_s) {
-    const int64_t key = std::llround(1e6 * stamp_s);
-    frames.push_back({stamp_s, CompareFrame(truth[key], detected[key], {.class_name = ""}),
+  for (const RunSummary::FrameRecord& frame : run.summary.frames) {
+    const int64_t key = std::llround(1e6 * frame.timestamp_s);
+    frames.push_back({frame.timestamp_s, CompareFrame(truth[key], detected[key], {.class_name = ""}),
                       CompareFrame(truth[key], compensated[key], {.class_name = ""})});
   }
   return frames;
@@ -65,7 +63,7 @@ nlohmann::ordered_json ToJson(const DetectionMetrics& metrics) {
 }
 
 // How many boxes each frame has, and how many of them were found.
-cv::Mat DrawRecall(const std::string& title, const std::vector<RecallOfFrame>& frames) {
+CurvePlot PlotRecall(const std::string& title, const std::vector<RecallOfFrame>& frames) {
   CurvePlot plot{title, "time [s]", "boxes", {}};
   CurvePlot::Curve all{"true boxes", kTruthColour, {}, 5},
       before{"found by the detector", kWithoutColour, {}, 1.2},
@@ -79,7 +77,7 @@ cv::Mat DrawRecall(const std::string& title, const std::vector<RecallOfFrame>& f
     add(after, frame.after.hits);
   }
   plot.curves = {all, before, after};
-  return DrawCurves(plot, 1100, 340);
+  return plot;
 }
 
 void PrintRow(const std::string& name, const DetectionMetrics& m) {
@@ -111,7 +109,7 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
     throw InputError(sequence, "has no true box of a person or car in these images",
                      "Give a scene, or a folder with boxes.csv as `simulate` writes it.");
   }
-  const std::vector<RecallOfFrame> frames = RecallByFrame(sequence, run);
+  const std::vector<RecallOfFrame> frames = RecallByFrame(run);
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const RecallOfFrame& frame : frames) {
     rows.push_back({{"timestamp", frame.timestamp_s},
@@ -134,7 +132,12 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
   const std::string title =
       fmt::format("Recall per frame: {:.1f}% before, {:.1f}% after compensation (the paper: 82.3%, 99.8%)",
                   100 * run.recall_before.FrameRecall(), 100 * run.recall_after.FrameRecall());
-  WritePicture((out / "recall.png").string(), DrawRecall(title, frames));
+  const CurvePlot plot = PlotRecall(title, frames);
+  WritePicture((out / "recall.png").string(), DrawCurves(plot, 1100, 340));
+  nlohmann::ordered_json before = {{"boxes", "of the detector"}}, after = {{"boxes", "after compensation"}};
+  before.update(ToJson(run.recall_before));
+  after.update(ToJson(run.recall_after));
+  WriteBenchReport(out, "Recall of the detector", arguments, {before, after}, {plot});
   fmt::print("\n{:<24} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
   PrintRow("detector", run.recall_before);
   PrintRow("after compensation", run.recall_after);

@@ -1,5 +1,6 @@
 #include "bench_run.h"
 
+#include <cctype>
 #include <exception>
 
 #include <CLI/CLI.hpp>
@@ -8,6 +9,7 @@
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/detector_factory.h"
+#include "dynamic_slam/io/trajectory_file.h"
 #include "source_arguments.h"
 
 namespace dynamic_slam {
@@ -29,7 +31,7 @@ void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments
                    "As of run; {source} in it stands for the sequence: boxes:{source}/boxes.csv")
       ->capture_default_str();
   command->add_option("--models", a.models, "Folder in which network files are looked for too");
-  command->add_option("--config", a.config, "YAML file with options");
+  command->add_option("--config", a.config, "YAML file with options, or a profile: " + ProfileHelp());
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
       ->type_name("KEY=VALUE");
   command->add_option("--out", a.out, fmt::format("Folder for {}", results))->capture_default_str();
@@ -43,31 +45,35 @@ void AddBenchOptions(CLI::App* command, const std::string& results, BenchArgumen
   AddSourceOptions(command, &arguments->source_options);
 }
 
+void ApplyArguments(const BenchArguments& arguments, SystemOptions* options) {
+  if (!arguments.config.empty()) LoadProfile(arguments.config, options);
+  ApplySet(options, arguments.assignments);
+}
+
 BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_name,
                      const std::vector<std::string>& assignments, RunConsole* console,
                      const std::function<void(const RunProgress&)>& on_frame) {
   SystemOptions options;
-  if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
-  ApplySet(&options, arguments.assignments);
+  ApplyArguments(arguments, &options);
   ApplySet(&options, assignments);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(source_name, arguments.source_options);
   BenchRun run;
-  run.system = std::make_unique<SlamSystem>(ChooseCamera(arguments.camera, source_name, *source), options);
-  if (std::shared_ptr<Detector> detector =
-          MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models)) {
-    run.detector = std::make_shared<RecordingDetector>(std::move(detector));
-  }
-  run.system->SetDetector(run.detector);
+  const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
+  run.system = std::make_unique<SlamSystem>(camera, options);
+  RunRecorder recorder(source_name, camera, options.image);
+  run.system->SetDetector(
+      recorder.Record(MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models)));
   RunControl control = console->Control();
-  if (on_frame) {
-    control.on_frame = [console, &on_frame](const RunProgress& progress) {
-      console->Show(progress);
-      on_frame(progress);
-    };
-  }
+  control.on_frame = [&](const RunProgress& progress) {
+    console->Show(progress);
+    recorder.Watch(progress);
+    if (on_frame) on_frame(progress);
+  };
   run.summary = RunSequence(*source, *run.system, control);
+  run.summary.source = source_name;
   console->End();
   if (run.summary.failure != nullptr) std::rethrow_exception(run.summary.failure);
+  run.record = recorder.Finish(run.summary, LoadGroundTruth(source_name));
   return run;
 }
 
@@ -103,6 +109,36 @@ void WriteRows(const std::filesystem::path& folder, const std::string& name,
                const nlohmann::ordered_json& rows) {
   WriteCsv(folder / (name + ".csv"), rows);
   WriteJson(folder / (name + ".json"), rows);
+}
+
+void WriteTables(const std::filesystem::path& folder, const std::vector<Table>& tables,
+                 const ReportPage& page) {
+  std::string text;
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const Table& table : tables) {
+    text += "\n" + TerminalText(table);
+    json.push_back(TableJson(table));
+    std::string name = table.title.substr(0, table.title.find(':'));
+    for (char& c : name) c = c == ' ' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    std::erase(name, ',');
+    WriteFileAtomically(folder / (name + ".csv"), CsvText(table));
+  }
+  fmt::print("{}\n", text);
+  WriteFileAtomically(folder / "tables.txt", text);
+  WriteJson(folder / "tables.json", json);
+  WritePage(folder / "report.html", page);
+}
+
+void WriteBenchReport(const std::filesystem::path& folder, const std::string& title,
+                      const BenchArguments& arguments, const nlohmann::ordered_json& rows,
+                      const std::vector<CurvePlot>& plots) {
+  ReportPage page{
+      .title = title,
+      .subtitle = fmt::format("detector {} · version {}", arguments.detector, DYNAMIC_SLAM_VERSION),
+      .times_s = {}};
+  if (!rows.empty()) page.sections.push_back(TableSection(TableOfRows("Results", rows)));
+  if (!plots.empty()) page.sections.push_back(CurvesSection("Curves", plots));
+  WritePage(folder / "report.html", page);
 }
 
 void WriteCurves(const std::filesystem::path& folder, const std::string& name, const CurvePlot& plot) {

@@ -10,9 +10,11 @@
 
 #include "dynamic_slam/eval/curve_plot.h"
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/report/report_page.h"
+#include "dynamic_slam/report/table.h"
 #include "dynamic_slam/system/sequence_runner.h"
-#include "recording_detector.h"
 #include "run_console.h"
+#include "run_recorder.h"
 
 namespace dynamic_slam {
 
@@ -37,9 +39,12 @@ inline constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.05;
 
 struct BenchRun {
   std::unique_ptr<SlamSystem> system;
-  std::shared_ptr<RecordingDetector> detector;  // none without one
   RunSummary summary;
+  RunRecord record;
 };
+
+// The options that the arguments' --config and --set give. Throws InputError.
+void ApplyArguments(const BenchArguments& arguments, SystemOptions* options);
 
 // Runs the source with these assignments after those of the arguments. `on_frame` may be empty. What a stage
 // throws is thrown here.
@@ -57,6 +62,15 @@ void WriteJson(const std::filesystem::path& file, const nlohmann::ordered_json& 
 // The same rows, flat objects with the same keys, as NAME.csv and NAME.json.
 void WriteRows(const std::filesystem::path& folder, const std::string& name,
                const nlohmann::ordered_json& rows);
+
+// Prints the tables; writes tables.txt, tables.json, each table as CSV, and the page as report.html.
+void WriteTables(const std::filesystem::path& folder, const std::vector<Table>& tables,
+                 const ReportPage& page);
+
+// Of an experiment: its rows, if it has some, and its curves, as report.html.
+void WriteBenchReport(const std::filesystem::path& folder, const std::string& title,
+                      const BenchArguments& arguments, const nlohmann::ordered_json& rows,
+                      const std::vector<CurvePlot>& plots);
 
 // Into NAME.png.
 void WriteCurves(const std::filesystem::path& folder, const std::string& name, const CurvePlot& plot);

@@ -94,7 +94,9 @@ double Growth(const std::vector<Window>& mapped, T Window::*member) {
   return first > 0 ? last / first - 1 : 0;
 }
 
-void Write(const std::filesystem::path& folder, const std::string& name, const std::vector<Window>& windows) {
+// And returns the curves.
+CurvePlot Write(const std::filesystem::path& folder, const std::string& name,
+                const std::vector<Window>& windows) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   CurvePlot plot{fmt::format("{}: time and memory along the sequence", name), "frame", "", {}};
   plot.curves = {{"tracking a frame, ms", CurveColour(0), {}},
@@ -116,11 +118,13 @@ void Write(const std::filesystem::path& folder, const std::string& name, const s
   }
   WriteRows(folder, "scale_" + name, rows);
   WriteCurves(folder, "scale_" + name, plot);
+  return plot;
 }
 
 void RunScale(const ScaleArguments& arguments, int* exit_code) {
   if (!arguments.out.empty()) PrepareOutputFolder(arguments.out);
   RunConsole console(arguments.quiet);
+  std::vector<CurvePlot> plots;
   for (const std::string& source : arguments.sources) {
     if (console.ShouldStop()) break;
     WindowLog log(arguments.window);
@@ -138,9 +142,14 @@ void RunScale(const ScaleArguments& arguments, int* exit_code) {
                arguments.mapped_at, 100 * Growth(mapped, &Window::tracking_ms),
                100 * Growth(mapped, &Window::cpu_ms), 100 * Growth(mapped, &Window::rss_mb),
                100 * Growth(mapped, &Window::keyframes));
-    if (!arguments.out.empty()) Write(arguments.out, ShortName(source), log.windows());
+    if (!arguments.out.empty()) {
+      plots.push_back(Write(arguments.out, ShortName(source), log.windows()));
+    }
   }
-  if (!arguments.out.empty()) fmt::print("results: {}\n", arguments.out);
+  if (!arguments.out.empty()) {
+    WriteBenchReport(arguments.out, "Time and memory along sequences", arguments, {}, plots);
+    fmt::print("results: {}\n", arguments.out);
+  }
   if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 

@@ -24,4 +24,8 @@ void AddRecallCommand(CLI::App* bench, int* exit_code);
 void AddInterferenceCommand(CLI::App* bench, int* exit_code);
 void AddInitCommand(CLI::App* bench, int* exit_code);
 
+// Adds the paper's tables: `bench tum` (1 to 4), `bench kitti` (5 to 7), and `bench profiles SOURCE` (8).
+void AddPaperCommands(CLI::App* bench, int* exit_code);
+void AddProfilesCommand(CLI::App* bench, int* exit_code);
+
 }  // namespace dynamic_slam

@@ -12,9 +12,11 @@
 
 #include "demo_picture.h"
 #include "dynamic_slam/io/trajectory_file.h"
+#include "dynamic_slam/report/path_section.h"
+#include "dynamic_slam/report/report_page.h"
+#include "dynamic_slam/report/table.h"
 #include "dynamic_slam/sim/simulation.h"
 #include "experiment.h"
-#include "frame_picture.h"
 #include "render_sequence.h"
 #include "run_console.h"
 
@@ -24,42 +26,11 @@ namespace {
 constexpr const char* kDefaultOut = "out/demo";
 // As TUM's walking_xyz: two people walk before the camera, which sways along all axes. And a block by car.
 constexpr const char* kScenes[] = {"office_walk", "street_short"};
-constexpr int kPicturesOfScene = 4;
 
 struct DemoArguments : BenchArguments {
   std::optional<uint64_t> seed;
   std::optional<int> frames;
   bool force = false;
-};
-
-// Of each stretch of the run, the frame in which dynamic objects take most of the image.
-class PictureChooser {
- public:
-  explicit PictureChooser(DemoScene* scene) : scene_(scene) {}
-
-  void Watch(const RunProgress& progress) {
-    const size_t stretch =
-        (progress.frame - 1) * kPicturesOfScene / std::max<size_t>(1, progress.frames_total);
-    double area = 0;
-    for (const DynamicBox& box : progress.result->objects.boxes) area += box.is_dynamic ? box.box.Area() : 0;
-    if (stretch == stretch_ && area <= most_area_ && !scene_->frames.empty()) return;
-    if (stretch != stretch_ || scene_->frames.empty()) {
-      scene_->frames.emplace_back();
-      scene_->captions.emplace_back();
-    }
-    stretch_ = stretch;
-    most_area_ = area;
-    scene_->frames.back() = progress.image->image.clone();
-    DrawFrame(progress, &scene_->frames.back());
-    const DynamicKeypoints& dynamic = progress.result->tracking.dynamic;
-    scene_->captions.back() = fmt::format("frame {}: {} of {} keypoints in dynamic boxes", progress.frame - 1,
-                                          dynamic.InBoxes(), progress.result->tracking.keypoints);
-  }
-
- private:
-  DemoScene* scene_;
-  size_t stretch_ = 0;
-  double most_area_ = 0;
 };
 
 DemoScene RunScene(const DemoArguments& arguments, const std::string& name, RunConsole* console) {
@@ -73,39 +44,82 @@ DemoScene RunScene(const DemoArguments& arguments, const std::string& name, RunC
   DemoScene scene;
   scene.name = name;
   scene.truth = LoadGroundTruth(sequence).value_or(Trajectory());
-  const auto write_to = [](const std::filesystem::path& folder) {
-    return [folder](const SlamSystem& system, const RunSummary& summary) {
-      WriteResults(folder, system, summary);
+  const auto write_to = [&name](const std::filesystem::path& folder, const std::string& what) {
+    return [=](const SlamSystem& system, const ExperimentRun& run) {
+      WriteResults(folder, system, run.summary);
+      WriteRunReport(folder, fmt::format("{}, {}", name, what), system, run.summary, run.record);
     };
   };
-  PictureChooser chooser(&scene);
-  scene.with = RunExperiment(
-      arguments, sequence.string(), console,
-      [&chooser](const RunProgress& progress) { chooser.Watch(progress); }, write_to(out / "with"));
+  scene.with =
+      RunExperiment(arguments, sequence.string(), console, {}, write_to(out / "with", "with semantics"));
   if (console->ShouldStop()) return scene;
-  scene.without =
-      RunExperiment(WithoutSemantics(arguments), sequence.string(), console, {}, write_to(out / "without"));
+  scene.without = RunExperiment(WithoutSemantics(arguments), sequence.string(), console, {},
+                                write_to(out / "without", "without semantics"));
   return scene;
 }
 
-void PrintTable(const std::vector<DemoScene>& scenes) {
-  fmt::print("\n{:<14} {:<10} {:>9} {:>10} {:>14} {:>13} {:>10}\n", "scene", "semantics", "coverage",
-             "APE/path", "recall before", "recall after", "ms/frame");
+Table MakeTable(const std::vector<DemoScene>& scenes) {
+  Table table{
+      .title = "Scenes",
+      .note =
+          "coverage: frames with a pose when their turn came. APE: rmse over the length of the path. "
+          "recall:\nboxes of people and cars found by the detector, and after compensation. ms/frame: median "
+          "of tracking.",
+      .columns = {{.name = "scene", .is_text = true}, {.name = "semantics", .is_text = true}},
+      .rows = {}};
+  for (const char* name : {"coverage", "APE/path", "recall before", "recall after", "ms/frame"}) {
+    table.columns.push_back({.name = name});
+  }
   for (const DemoScene& scene : scenes) {
     for (const bool with : {true, false}) {
       const ExperimentRun& run = with ? scene.with : scene.without;
       const auto recall = [with](const DetectionMetrics& metrics) {
         return with ? fmt::format("{:.3f}", metrics.Recall()) : std::string("-");
       };
-      fmt::print("{:<14} {:<10} {:>9} {:>10} {:>14} {:>13} {:>10.1f}\n", scene.name,
-                 with ? "with" : "without", Percent(run.Coverage(), 1), Percent(run.ErrorShare()),
-                 recall(run.recall_before), recall(run.recall_after), run.summary.tracking_ms.median);
+      table.rows.push_back({scene.name, with ? "with" : "without", Percent(run.Coverage(), 1),
+                            Percent(run.ErrorShare()), recall(run.recall_before), recall(run.recall_after),
+                            fmt::format("{:.1f}", run.summary.tracking_ms.median)});
     }
   }
-  fmt::print(
-      "coverage: frames with a pose when their turn came. APE: rmse over the length of the path. recall: "
-      "boxes\n"
-      "of people and cars found by the detector, and after compensation. ms/frame: median of tracking.\n\n");
+  return table;
+}
+
+// Both paths of a scene over the truth.
+nlohmann::ordered_json PathsOf(const DemoScene& scene) {
+  PathPicture picture{.title = scene.name,
+                      .note = "The path with semantics has the colours of its error; without it is orange.",
+                      .start_s = scene.truth.front().timestamp_s,
+                      .truth = scene.truth,
+                      .tracks = {}};
+  const auto add = [&picture](const std::string& name, const std::string& colour, const ExperimentRun& run) {
+    if (!run.truth.has_value()) return;
+    picture.tracks.push_back({.name = name,
+                              .colour = colour,
+                              .path = run.trajectory,
+                              .shown_from_world = run.truth->ape.reference_from_estimate});
+  };
+  add("with semantics", "c1", scene.with);
+  if (scene.with.truth.has_value()) picture.tracks.front().errors = scene.with.truth->ape.errors;
+  add("without semantics", "c2", scene.without);
+  return PathsSection(picture);
+}
+
+ReportPage MakePage(const std::vector<DemoScene>& scenes, const Table& table) {
+  ReportPage page{.title = "The demo",
+                  .subtitle = "An office and a street that the program rendered itself.",
+                  .times_s = {}};
+  nlohmann::ordered_json section = TableSection(table);
+  for (size_t i = 0; i < table.rows.size(); ++i) {
+    const std::vector<std::string>& row = table.rows[i];
+    section["rows"][i][1] = {{"text", row[1]}, {"href", fmt::format("{}/{}/report.html", row[0], row[1])}};
+  }
+  page.sections.push_back(std::move(section));
+  for (const DemoScene& scene : scenes) {
+    if (!scene.truth.empty()) page.sections.push_back(PathsOf(scene));
+    page.sections.push_back(FramesSection(scene.with.record.frames, 480));
+    page.sections.back()["title"] = scene.name + ": frames";
+  }
+  return page;
 }
 
 void RunDemo(const DemoArguments& arguments, int* exit_code) {
@@ -115,10 +129,13 @@ void RunDemo(const DemoArguments& arguments, int* exit_code) {
     if (console.ShouldStop()) break;
     scenes.push_back(RunScene(arguments, name, &console));
   }
-  PrintTable(scenes);
+  const Table table = MakeTable(scenes);
+  fmt::print("\n{}\n", TerminalText(table));
+  WritePage(std::filesystem::path(arguments.out) / "report.html", MakePage(scenes, table));
   const std::filesystem::path picture = std::filesystem::path(arguments.out) / "overview.png";
   WritePicture(picture.string(), DrawDemo(scenes));
-  fmt::print("picture: {}\nresults: {}/SCENE, images in sequence/\n", picture.string(), arguments.out);
+  fmt::print("picture: {}\nreport: {}/report.html\nresults: {}/SCENE, images in sequence/\n",
+             picture.string(), arguments.out, arguments.out);
   if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 

@@ -16,7 +16,6 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include "box_picture.h"
 #include "compensated_detections.h"
 #include "detection_report.h"
 #include "dynamic_slam/base/error.h"
@@ -26,6 +25,7 @@
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/io/image_preparer.h"
+#include "dynamic_slam/report/box_picture.h"
 #include "run_console.h"
 #include "source_arguments.h"
 

@@ -16,12 +16,14 @@
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
 #include "mask_folder.h"
 #include "overlay_writer.h"
 #include "run_console.h"
+#include "run_recorder.h"
 #include "source_arguments.h"
 #include "truth_report.h"
 
@@ -37,6 +39,7 @@ struct RunArguments {
   std::string mode = "offline";
   std::string out;
   std::string trace;
+  std::string truth;
   std::string models;
   std::string overlay, masks, export_masks;
   std::string save_map, load_map;
@@ -78,7 +81,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   TraceThreadName("main");
   if (!arguments.trace.empty()) StartTrace();
   SystemOptions options;
-  if (!arguments.config.empty()) LoadOptions(arguments.config, &options);
+  if (!arguments.config.empty()) LoadProfile(arguments.config, &options);
   ApplySet(&options, arguments.assignments);
   if (arguments.detector_latency_ms) options.detector.latency_ms = *arguments.detector_latency_ms;
   options.tracker.localise_only |= arguments.localise_only;
@@ -88,8 +91,11 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
   const Camera camera = ChooseCamera(arguments.camera, arguments.source, *source);
   const std::filesystem::path out = OutputFolder(arguments);
+  std::optional<Trajectory> truth;
+  if (!arguments.truth.empty()) truth = ReadGroundTruth(arguments.truth, arguments.source);
   SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
-  system.SetDetector(detector);
+  RunRecorder recorder(arguments.source, camera, options.image);
+  system.SetDetector(recorder.Record(detector));
   if (!arguments.load_map.empty()) system.LoadMap(ReadMapFile(arguments.load_map), arguments.load_map);
   if (!arguments.masks.empty() && !std::filesystem::is_directory(arguments.masks)) {
     throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
@@ -115,6 +121,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   }
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
+    recorder.Watch(progress);
     if (overlay.has_value()) overlay->Write(progress);
     if (masks.has_value()) masks->Write(*progress.image, *progress.result);
   };
@@ -128,10 +135,12 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
   }
   PrintSummary(summary);
-  ReportTruth(arguments.source, system.FrameTrajectory(), out);
+  if (arguments.truth.empty()) truth = FindTruth(arguments.source);
+  if (truth.has_value()) ReportTruth(*truth, system.FrameTrajectory(), out);
+  WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
   if (!arguments.trace.empty()) EndTrace(arguments.trace);
   if (!arguments.save_map.empty() && summary.failure == nullptr) fmt::print("map: {}\n", arguments.save_map);
-  fmt::print("results: {}\n", out.string());
+  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
@@ -148,8 +157,9 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->required();
   command->add_option("--camera", a.camera,
                       "Name of a known camera, or camera file (default: what SOURCE says)");
-  command->add_option("--config", a.config,
-                      "YAML file with options (the keys of config.yaml in the results)");
+  command->add_option(
+      "--config", a.config,
+      "YAML file with options (the keys of config.yaml in the results), or a profile: " + ProfileHelp());
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
       ->type_name("KEY=VALUE");
   command->add_option("--detector", a.detector, "Object detector: " + DetectorHelp())->capture_default_str();
@@ -180,6 +190,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                     "Frames that had no pose when their turn came do not get one in the finished map");
   command->add_option("--trace", a.trace,
                       "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
+  command->add_option("--truth", a.truth,
+                      "Ground truth, in TUM's or KITTI's format (default: that beside the images)");
   AddSourceOptions(command, &a.source_options);
   command->add_flag("--quiet", a.quiet, "No progress line");
   command->footer(

@@ -4,40 +4,53 @@
 
 #include <fmt/core.h>
 
-#include "box_picture.h"
-#include "frame_picture.h"
+#include "dynamic_slam/report/box_picture.h"
+#include "dynamic_slam/report/frame_picture.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr int kColumns = 2;
+constexpr size_t kFrames = 4;
 constexpr double kMarginPx = 16, kGapPx = 8;
 constexpr double kTitlePx = 12, kTextPx = 8;
 constexpr double kTitleHeightPx = 40, kCaptionPx = 20, kLegendPx = 40;
 constexpr double kImageWidthPx = 330, kPlotWidthPx = 620;
 
-double RowHeight(const DemoScene& scene) {
-  if (scene.frames.empty()) return 0;
-  return kImageWidthPx * scene.frames.front().rows / scene.frames.front().cols + kCaptionPx + kGapPx;
+// A few of the run with semantics, from all of its length.
+std::vector<ChosenFrame> FramesOf(const DemoScene& scene) {
+  const std::vector<ChosenFrame>& all = scene.with.record.frames;
+  const size_t stride = std::max<size_t>(1, all.size() / kFrames);
+  std::vector<ChosenFrame> frames;
+  for (size_t i = 0; i < all.size() && frames.size() < kFrames; i += stride) frames.push_back(all[i]);
+  return frames;
+}
+
+double RowHeight(const std::vector<ChosenFrame>& frames) {
+  if (frames.empty()) return 0;
+  const cv::Mat& picture = frames.front().picture;
+  return kImageWidthPx * picture.rows / picture.cols + kCaptionPx + kGapPx;
 }
 
 double SceneHeight(const DemoScene& scene) {
-  const size_t rows = (scene.frames.size() + kColumns - 1) / kColumns;
-  return kTitleHeightPx + std::max(static_cast<double>(rows) * RowHeight(scene), 320.0) + kGapPx;
+  const std::vector<ChosenFrame> frames = FramesOf(scene);
+  const size_t rows = (frames.size() + kColumns - 1) / kColumns;
+  return kTitleHeightPx + std::max(static_cast<double>(rows) * RowHeight(frames), 320.0) + kGapPx;
 }
 
 void DrawScene(const DemoScene& scene, double top, Canvas* canvas) {
   canvas->Text(fmt::format("{}: the error is {} of the path, without semantics {}", scene.name,
                            Percent(scene.with.ErrorShare()), Percent(scene.without.ErrorShare())),
                {kMarginPx, top + kTitleHeightPx - 16}, kTitlePx, kInk);
-  for (size_t i = 0; i < scene.frames.size(); ++i) {
+  const std::vector<ChosenFrame> frames = FramesOf(scene);
+  for (size_t i = 0; i < frames.size(); ++i) {
     const Eigen::Vector2d place(static_cast<double>(i % kColumns), static_cast<double>(i / kColumns));
     const Eigen::Vector2d corner =
         Eigen::Vector2d(kMarginPx, top + kTitleHeightPx) +
-        place.cwiseProduct(Eigen::Vector2d(kImageWidthPx + kGapPx, RowHeight(scene)));
-    const double height = RowHeight(scene) - kCaptionPx - kGapPx;
-    canvas->Image(scene.frames[i], corner, kImageWidthPx, height);
-    canvas->Text(scene.captions[i], corner + Eigen::Vector2d(0, height + 14), kTextPx, kInk);
+        place.cwiseProduct(Eigen::Vector2d(kImageWidthPx + kGapPx, RowHeight(frames)));
+    const double height = RowHeight(frames) - kCaptionPx - kGapPx;
+    canvas->Image(frames[i].picture, corner, kImageWidthPx, height);
+    canvas->Text(frames[i].caption, corner + Eigen::Vector2d(0, height + 14), kTextPx, kInk);
   }
   if (scene.truth.empty()) return;
   TrajectoryPlot plot = PlotBoth(scene.truth, scene.with, scene.without);

@@ -14,8 +14,6 @@ struct DemoScene {
   std::string name;
   Trajectory truth;
   ExperimentRun with, without;  // the semantic part
-  std::vector<cv::Mat> frames;  // of the run with it, CV_8UC3, all of one size
-  std::vector<std::string> captions;
 };
 
 // All scenes at a glance, CV_8UC3, one below the other: left frames with boxes, mask and keypoints, right

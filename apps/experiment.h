@@ -1,9 +1,7 @@
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -12,7 +10,6 @@
 #include "bench_run.h"
 #include "dynamic_slam/eval/detection_metrics.h"
 #include "dynamic_slam/eval/trajectory_plot.h"
-#include "dynamic_slam/io/box_file.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "run_console.h"
 #include "truth_report.h"
@@ -27,9 +24,8 @@ struct ExperimentRun {
   RunSummary summary;
   Trajectory trajectory;                         // of the main part of the map
   std::optional<TruthComparison> truth;          // none without truth, or where the camera went nowhere
-  std::vector<BoxRecord> detected;               // movers by their class, as the detector named them
-  std::vector<BoxRecord> compensated;            // the same as tracking was told of them
-  DetectionMetrics recall_before, recall_after;  // by TrueMovers; of nothing without truth
+  RunRecord record;                              // truth, boxes and frames
+  DetectionMetrics recall_before, recall_after;  // by the true boxes; of nothing without truth
 
   double Coverage() const { return summary.Coverage(); }  // live
   std::optional<double> ErrorShare() const {              // APE (rmse) over the path
@@ -40,17 +36,13 @@ struct ExperimentRun {
 
 // Runs the SLAM offline over a sequence; `on_system` may be empty, and is called when the run has ended.
 // Throws InputError for what is wrong with the sequence or the options.
-ExperimentRun RunExperiment(const BenchArguments& arguments, const std::string& source, RunConsole* console,
-                            const std::function<void(const RunProgress&)>& on_frame = {},
-                            const std::function<void(const SlamSystem&, const RunSummary&)>& on_system = {});
+ExperimentRun RunExperiment(
+    const BenchArguments& arguments, const std::string& source, RunConsole* console,
+    const std::function<void(const RunProgress&)>& on_frame = {},
+    const std::function<void(const SlamSystem&, const ExperimentRun&)>& on_system = {});
 
 // The same arguments without the semantic part.
 BenchArguments WithoutSemantics(BenchArguments arguments);
-
-// The true boxes, in the images of the stamps (s), of movers: people and cars, parked ones too, whose class
-// the program's own prior calls dynamic. Those lower than 30 px count as hidden, as a small network cannot
-// know them (detection_metrics.h: neither found nor missed). Empty where the folder has no boxes.csv.
-std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::span<const double> stamps_s);
 
 // The number, or null.
 nlohmann::ordered_json OrNull(const std::optional<double>& value);

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dynamic_slam/eval/canvas.h"
-#include "frame_picture.h"
+#include "dynamic_slam/report/frame_picture.h"
 
 namespace dynamic_slam {
 namespace {

@@ -71,7 +71,8 @@ void RunConsole::Show(const RunProgress& progress) {
 }
 
 void RunConsole::End() {
-  if (line_open_) fmt::print(stderr, "\r\033[K");
+  if (!line_open_) return;
+  fmt::print(stderr, "\r\033[K");
   line_open_ = false;
 }
 

@@ -2,9 +2,11 @@
 
 #include <optional>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
+#include "dynamic_slam/base/config_files.h"
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/options.h"
 #include "dynamic_slam/io/camera_file.h"
 
 namespace dynamic_slam {
@@ -25,5 +27,11 @@ Camera ChooseCamera(const std::string& name_or_file, const std::string& source_n
   CheckCameraFits(camera, name_or_file.empty() ? source_name : name_or_file, source.ImageSize());
   return camera;
 }
+
+void LoadProfile(const std::string& name_or_file, SystemOptions* options) {
+  LoadOptions(FindConfig("profiles", "options", name_or_file), options);
+}
+
+std::string ProfileHelp() { return fmt::format("{}", fmt::join(ConfigNames("profiles"), ", ")); }
 
 }  // namespace dynamic_slam

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/system/system_options.h"
 
 namespace dynamic_slam {
 
@@ -21,5 +22,11 @@ inline void AddSourceOptions(CLI::App* command, FrameSourceOptions* options) {
 // InputError when there is none, or it does not fit the images.
 Camera ChooseCamera(const std::string& name_or_file, const std::string& source_name,
                     const FrameSource& source);
+
+// Options from a file, or of a profile in config/profiles, by its name. Throws InputError.
+void LoadProfile(const std::string& name_or_file, SystemOptions* options);
+
+// "fast, g3, ...".
+std::string ProfileHelp();
 
 }  // namespace dynamic_slam

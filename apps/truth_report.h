@@ -2,34 +2,16 @@
 
 #include <filesystem>
 #include <optional>
-#include <string>
 
-#include "dynamic_slam/eval/metrics.h"
-#include "dynamic_slam/eval/trajectory_plot.h"
-#include "dynamic_slam/geometry/trajectory.h"
+#include "dynamic_slam/report/truth_comparison.h"
 
 namespace dynamic_slam {
 
-// An estimated trajectory beside the true one.
-struct TruthComparison {
-  TrajectoryErrors ape;  // after sim(3) alignment
-  double path_m = 0;     // length of the matched part of the truth
-  Trajectory truth;      // from the first to the last estimated frame
-};
+// Ground truth beside the source. Nothing where there is none; also nothing, with the reason on the terminal,
+// where it cannot be read, as the run is as good.
+std::optional<Trajectory> FindTruth(const std::filesystem::path& source);
 
-// Throws InputError when too few poses match, or all lie on one line.
-TruthComparison CompareWithTruth(const Trajectory& truth, const Trajectory& estimate);
-
-// "rmse 0.0123 m (0.45% of the path of 2.7 m)".
-std::string DescribeApe(const TruthComparison& comparison);
-
-// The truth and, moved onto it, the estimate.
-TrajectoryPlot PlotOverTruth(const TruthComparison& comparison, const Trajectory& estimate);
-
-// Looks for ground truth beside the source. Where there is some, prints the error and draws trajectory.png
-// into `out`. Nothing where there is none; also nothing, with the reason on the terminal, where it does not
-// fit.
-std::optional<TruthComparison> ReportTruth(const std::filesystem::path& source, const Trajectory& estimate,
-                                           const std::filesystem::path& out);
+// Prints the error and draws trajectory.png into `out`; else, the reason why there is no error.
+void ReportTruth(const Trajectory& truth, const Trajectory& estimate, const std::filesystem::path& out);
 
 }  // namespace dynamic_slam

@@ -57,6 +57,16 @@ Sim3 Align(MatchedPoses& poses, Alignment alignment) {
   return reference_from_estimate;
 }
 
+void SummariseErrors(TrajectoryErrors* result) {
+  std::vector<double> translation_m, rotation_deg;
+  for (const PoseError& error : result->errors) {
+    translation_m.push_back(error.translation_m);
+    rotation_deg.push_back(error.rotation_deg);
+  }
+  result->translation_m = Summarise(std::move(translation_m));
+  result->rotation_deg = Summarise(std::move(rotation_deg));
+}
+
 std::vector<std::pair<size_t, size_t>> PairsAtDelta(const PoseList& estimate, const RpeOptions& options) {
   std::vector<size_t> ends;
   if (options.delta_unit == DeltaUnit::kFrames) {
@@ -118,14 +128,13 @@ TrajectoryErrors AbsolutePoseError(const MatchedPoses& poses, Alignment alignmen
   MatchedPoses aligned = poses;
   TrajectoryErrors result;
   result.reference_from_estimate = Align(aligned, alignment);
-  std::vector<double> translation_m, rotation_deg;
   for (size_t i = 0; i < aligned.estimate.size(); ++i) {
     const EvalPose error = Between(aligned.reference[i], aligned.estimate[i]);
-    translation_m.push_back((aligned.estimate[i].position - aligned.reference[i].position).norm());
-    rotation_deg.push_back(RotationAngleDeg(error.rotation));
+    result.errors.push_back({aligned.estimate[i].timestamp_s,
+                             (aligned.estimate[i].position - aligned.reference[i].position).norm(),
+                             RotationAngleDeg(error.rotation)});
   }
-  result.translation_m = Summarise(std::move(translation_m));
-  result.rotation_deg = Summarise(std::move(rotation_deg));
+  SummariseErrors(&result);
   return result;
 }
 
@@ -140,22 +149,20 @@ TrajectoryErrors RelativePoseError(const MatchedPoses& poses, Alignment alignmen
   MatchedPoses aligned = poses;
   TrajectoryErrors result;
   result.reference_from_estimate = Align(aligned, alignment);
-  std::vector<double> translation_m, rotation_deg;
   for (const auto& [i, j] : PairsAtDelta(aligned.estimate, options)) {
     const EvalPose error = Between(Between(aligned.reference[i], aligned.reference[j]),
                                    Between(aligned.estimate[i], aligned.estimate[j]));
-    translation_m.push_back(error.position.norm());
-    rotation_deg.push_back(RotationAngleDeg(error.rotation));
+    result.errors.push_back(
+        {aligned.estimate[j].timestamp_s, error.position.norm(), RotationAngleDeg(error.rotation)});
   }
-  if (translation_m.empty()) {
+  if (result.errors.empty()) {
     const char* unit = options.delta_unit == DeltaUnit::kFrames ? "frames" : "m";
     throw InputError("--delta",
                      fmt::format("no two of the {} matched poses are {} {} apart", poses.estimate.size(),
                                  options.delta, unit),
                      "Give a smaller --delta.");
   }
-  result.translation_m = Summarise(std::move(translation_m));
-  result.rotation_deg = Summarise(std::move(rotation_deg));
+  SummariseErrors(&result);
   return result;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "dynamic_slam/eval/pose_list.h"
 #include "dynamic_slam/geometry/sim3.h"
@@ -31,10 +32,17 @@ struct ErrorStatistics {
   double sse = 0;  // sum of squared errors; std is the population's
 };
 
+// One of the errors; of a relative one, the pose at which the motion ends.
+struct PoseError {
+  double timestamp_s = 0;  // of the estimate
+  double translation_m = 0, rotation_deg = 0;
+};
+
 struct TrajectoryErrors {
   ErrorStatistics translation_m;
   ErrorStatistics rotation_deg;
-  Sim3 reference_from_estimate;  // the alignment that was applied; its scale is evo's
+  Sim3 reference_from_estimate;   // the alignment that was applied; its scale is evo's
+  std::vector<PoseError> errors;  // in order
 };
 
 // For each pose of the shorter list (the estimate, when they are equally long) the pose of the longer one

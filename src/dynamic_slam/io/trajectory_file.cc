@@ -54,6 +54,15 @@ const std::string kTumLine = "timestamp tx ty tz qx qy qz qw";
 const std::string kKittiLine = "12 numbers, the rows of [R t]";
 const std::string kTimesLine = "one stamp in seconds";
 
+Trajectory StampedKittiPoses(const fs::path& poses_file, const fs::path& times_file) {
+  const std::vector<double> times = ReadTimes(times_file);
+  const std::vector<Rigid3> poses = ReadKittiPoses(poses_file);
+  Trajectory trajectory;
+  for (size_t i = 0; i < std::min(times.size(), poses.size()); ++i)
+    trajectory.push_back({times[i], poses[i]});
+  return trajectory;
+}
+
 }  // namespace
 
 Trajectory ReadTumTrajectory(const fs::path& file) {
@@ -146,12 +155,18 @@ std::optional<Trajectory> LoadGroundTruth(const fs::path& source) {
   const fs::path poses_file =
       sequence.parent_path().parent_path() / "poses" / (sequence.filename().string() + ".txt");
   if (!fs::is_regular_file(sequence / "times.txt") || !fs::is_regular_file(poses_file)) return std::nullopt;
-  const std::vector<double> times = ReadTimes(sequence / "times.txt");
-  const std::vector<Rigid3> poses = ReadKittiPoses(poses_file);
-  Trajectory trajectory;
-  for (size_t i = 0; i < std::min(times.size(), poses.size()); ++i)
-    trajectory.push_back({times[i], poses[i]});
-  return trajectory;
+  return StampedKittiPoses(poses_file, sequence / "times.txt");
+}
+
+Trajectory ReadGroundTruth(const fs::path& file, const fs::path& source) {
+  const std::vector<TextLine> lines = ReadDataLines(file);
+  const bool is_kitti = !lines.empty() && SplitColumns(lines.front().text).size() == 12;
+  if (!is_kitti) return ReadTumTrajectory(file);
+  if (!fs::is_regular_file(source / "times.txt")) {
+    throw InputError(file.string(), "has poses without stamps",
+                     fmt::format("Put times.txt into {}, or give a file in TUM format.", source.string()));
+  }
+  return StampedKittiPoses(file, source / "times.txt");
 }
 
 }  // namespace dynamic_slam

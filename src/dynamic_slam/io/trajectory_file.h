@@ -37,4 +37,8 @@ std::vector<double> ReadTimes(const std::filesystem::path& file);
 // when there is none.
 std::optional<Trajectory> LoadGroundTruth(const std::filesystem::path& source);
 
+// Ground truth in any file: TUM format, or KITTI's with the stamps of times.txt in the source's folder.
+// Throws InputError.
+Trajectory ReadGroundTruth(const std::filesystem::path& file, const std::filesystem::path& source);
+
 }  // namespace dynamic_slam

@@ -60,6 +60,8 @@ struct RunSummary {
     DynamicKeypoints dynamic;
     double tracking_ms = 0;
     std::string reason;
+    bool map_was_erased = false;                  // the part of the map that the camera was in
+    size_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
   };
   std::vector<FrameRecord> frames;
   double Coverage() const {  // live

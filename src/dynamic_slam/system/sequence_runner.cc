@@ -44,7 +44,7 @@ class FrameLog {
  public:
   explicit FrameLog(RunSummary* summary) : summary_(summary) {}
 
-  void Add(double timestamp_s, const FrameResult& result) {
+  void Add(double timestamp_s, const FrameResult& result, const SharedMap& map) {
     const TrackingResult& tracking = result.tracking;
     const bool is_tracking = tracking.state == TrackingState::kTracking;
     if (tracking.part_was_erased) {
@@ -60,7 +60,13 @@ class FrameLog {
     summary_->most_keyframes_waiting = std::max(summary_->most_keyframes_waiting, result.keyframes_waiting);
     summary_->frames.push_back({timestamp_s, tracking.state, tracking.keypoints, tracking.inliers,
                                 tracking.keyframe_reason, result.objects.state, result.objects.boxes.size(),
-                                tracking.dynamic, result.tracking_ms, tracking.reason});
+                                tracking.dynamic, result.tracking_ms, tracking.reason,
+                                tracking.part_was_erased, 0, 0});
+    {
+      const auto now = map.Read();
+      summary_->frames.back().map_keyframes = now->keyframes().size();
+      summary_->frames.back().map_landmarks = now->landmarks().size();
+    }
     if (tracking.keypoints > 0) {
       dynamic_ratios_ += static_cast<double>(tracking.dynamic.InBoxes()) / tracking.keypoints;
       summary_->mean_dynamic_ratio = dynamic_ratios_ / static_cast<double>(summary_->frames.size());
@@ -112,10 +118,10 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
       }
       const FrameResult result =
           system.Process(image->timestamp_s, image->image, control.mask ? control.mask(*image) : cv::Mat());
-      log.Add(image->timestamp_s, result);
+      log.Add(image->timestamp_s, result, system.map());
       if (control.on_frame)
-        control.on_frame(
-            {summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map(), system.detector()});
+        control.on_frame({summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map(),
+                          system.detector()});
     }
     end_feed();
     if (summary.interrupted) system.Stop();

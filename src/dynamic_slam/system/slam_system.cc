@@ -149,6 +149,7 @@ void SlamSystem::PostLoops() {
 }
 
 void SlamSystem::CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token) {
+  const auto start = std::chrono::steady_clock::now();
   const auto should_stop = [&token] { return token.stop_requested(); };
   const LoopResult result = loop_closer_.Process(keyframe.id, keyframe.epoch, should_stop);
   std::optional<BundleSummary> bundle;
@@ -163,6 +164,7 @@ void SlamSystem::CloseLoop(const MappedKeyframe& keyframe, const std::stop_token
   report->landmarks_merged += result.landmarks_merged;
   report->bundles += bundle.has_value();
   report->bundles_stopped += bundle.has_value() && bundle->stopped;
+  report->times_ms.push_back(MillisecondsSince(start));
 }
 
 BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {

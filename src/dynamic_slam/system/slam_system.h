@@ -56,6 +56,7 @@ struct LoopReport {
   int joined = 0;                     // of these, those that made one of two parts of the map
   int landmarks_merged = 0;
   int bundles = 0, bundles_stopped = 0;  // adjustments of the whole map after that
+  std::vector<double> times_ms;          // of each keyframe that was looked at
 };
 
 // Dynamic-SLAM. All calls come from one thread; in realtime mode the stages beside tracking have their own.

@@ -11,11 +11,7 @@ namespace {
 // Nearest over second nearest distance of a landmark's candidates in one octave.
 constexpr double kWindowRatio = 0.8;
 constexpr double kKeyframeRatio = 0.85;
-
-// Where somebody may stand before the landmark, any corner may be found in its place.
-int MaxDistance(const Frame& frame, uint32_t keypoint) {
-  return frame.StaticProbability(keypoint) < kMinStaticProbability ? kStrictDistance : kLooseDistance;
-}
+constexpr int kKeyframeDistance = (kStrictDistance + kLooseDistance) / 2;
 
 double TrustIn(const Frame& frame, size_t keypoint) {
   return TrustInMatch(frame.StaticProbability(keypoint), frame.static_log_odds[keypoint]);
@@ -30,6 +26,11 @@ PoseTracker::PoseTracker(const Camera& camera, const TrackerOptions& options,
       octave_scales_(std::move(octave_scales)),
       projector_(camera, octave_scales_),
       optimizer_(camera, options.pose) {}
+
+int PoseTracker::MaxDistance(const Frame& frame, uint32_t keypoint) const {
+  if (frame.StaticProbability(keypoint) >= kMinStaticProbability) return options_.max_match_distance;
+  return std::min(options_.max_match_distance, kStrictDistance);
+}
 
 int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_from_world, double radius_px,
                                 Frame* frame) {
@@ -69,8 +70,9 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
   for (uint32_t i = 0; i < frame->features.size(); ++i) {
     if (frame->StaticProbability(i) >= kMinStaticProbability) usable.push_back(i);
   }
-  const std::vector<Match> matches = MatchMutual(keyframe.features(), with_landmark, frame->features, usable,
-                                                 (kStrictDistance + kLooseDistance) / 2, kKeyframeRatio);
+  const std::vector<Match> matches =
+      MatchMutual(keyframe.features(), with_landmark, frame->features, usable,
+                  std::min(options_.max_match_distance, kKeyframeDistance), kKeyframeRatio);
   candidates_.clear();
   rotation_.Clear();
   for (const Match& match : matches) {

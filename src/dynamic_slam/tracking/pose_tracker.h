@@ -49,6 +49,9 @@ class PoseTracker {
   };
   void AcceptCandidates(Frame* frame);
 
+  // Where somebody may stand before the landmark, any corner may be found in its place.
+  int MaxDistance(const Frame& frame, uint32_t keypoint) const;
+
   // Keypoints that are not to be used count as taken.
   void TakeUnusable(const Frame& frame);
 

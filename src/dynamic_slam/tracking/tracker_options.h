@@ -77,6 +77,7 @@ struct KeyframePolicyOptions {
 struct TrackerOptions {
   double motion_radius_px = 15;
   double local_map_radius_px = 4;
+  int max_match_distance = 100;
   int min_motion_inliers = 15;
   int min_inliers = 35;
   int movers_min_inliers = 55;
@@ -98,6 +99,11 @@ struct TrackerOptions {
                       "Search radius about the place that the motion model predicts, in octave 0."});
     visit("local_map_radius_px", self.local_map_radius_px,
           OptionField{"px", 0.5, 100, "Search radius about a local landmark's projection, in octave 0."});
+    visit(
+        "max_match_distance", self.max_match_distance,
+        OptionField{"bits", 1, 256,
+                    "Most that a landmark's descriptor may differ from a keypoint's; within dynamic boxes 60 "
+                    "at most."});
     visit("min_motion_inliers", self.min_motion_inliers,
           OptionField{"", 4, 1000, "Inliers that a first guess of the pose needs."});
     visit("min_inliers", self.min_inliers,

@@ -1,9 +1,9 @@
-#include "frame_picture.h"
+#include "dynamic_slam/report/frame_picture.h"
 
 #include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
 
-#include "box_picture.h"
+#include "dynamic_slam/report/box_picture.h"
 #include "dynamic_slam/semantics/selective_tracking.h"
 
 namespace dynamic_slam {

@@ -1,4 +1,4 @@
-#include "box_picture.h"
+#include "dynamic_slam/report/box_picture.h"
 
 #include <algorithm>
 #include <cmath>

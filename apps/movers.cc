@@ -1,0 +1,40 @@
+#include "movers.h"
+
+#include <cmath>
+#include <cstdint>
+#include <set>
+
+#include "dynamic_slam/semantics/dynamic_prior.h"
+#include "dynamic_slam/semantics/dynamic_score.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr double kMinTrueHeightPx = 30;
+
+int64_t Microseconds(double stamp_s) { return std::llround(stamp_s * 1e6); }
+
+}  // namespace
+
+std::vector<BoxRecord> MoversOf(std::vector<BoxRecord> records) {
+  const DynamicPrior prior = LoadDynamicPrior("dynamic_prior");
+  const double threshold = DynamicScoreOptions().threshold;
+  std::erase_if(records,
+                [&](const BoxRecord& record) { return prior.Score(record.class_name) <= threshold; });
+  return records;
+}
+
+std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::span<const double> stamps_s) {
+  if (!std::filesystem::exists(sequence / "boxes.csv")) return {};
+  std::set<int64_t> wanted;
+  for (const double stamp_s : stamps_s) wanted.insert(Microseconds(stamp_s));
+  std::vector<BoxRecord> movers = MoversOf(ReadBoxFile(sequence / "boxes.csv"));
+  std::erase_if(movers,
+                [&](const BoxRecord& record) { return !wanted.contains(Microseconds(record.timestamp_s)); });
+  for (BoxRecord& record : movers) {
+    if (record.box.height < kMinTrueHeightPx) record.visible = 0;
+  }
+  return movers;
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,48 @@
+#include "run_recorder.h"
+
+#include <utility>
+
+#include "dynamic_slam/base/error.h"
+#include "movers.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr int kFrames = 8;  // in a report
+
+}  // namespace
+
+RunRecorder::RunRecorder(std::filesystem::path source, const Camera& raw_camera, const ImageOptions& options)
+    : source_(std::move(source)), frames_(raw_camera, options, kFrames) {}
+
+std::shared_ptr<Detector> RunRecorder::Record(std::shared_ptr<Detector> detector) {
+  if (detector != nullptr) detector_ = std::make_shared<RecordingDetector>(std::move(detector));
+  return detector_;
+}
+
+void RunRecorder::Watch(const RunProgress& progress) {
+  frames_.Watch(progress);
+  for (const DynamicBox& box : progress.result->objects.boxes) {
+    compensated_.push_back({progress.image->timestamp_s,
+                            progress.detector->class_names()[static_cast<size_t>(box.class_id)], box.score, 1,
+                            box.box});
+  }
+}
+
+RunRecord RunRecorder::Finish(const RunSummary& summary, std::optional<Trajectory> truth) {
+  RunRecord record{.truth = std::move(truth), .frames = std::move(frames_.frames())};
+  if (detector_ == nullptr) return record;
+  std::vector<double> stamps_s;
+  for (const RunSummary::FrameRecord& frame : summary.frames) stamps_s.push_back(frame.timestamp_s);
+  record.detected = MoversOf(detector_->records());
+  record.compensated = MoversOf(std::move(compensated_));
+  record.true_boxes = TrueMovers(source_, stamps_s);
+  return record;
+}
+
+void WriteRunReport(const std::filesystem::path& folder, const std::string& title, const SlamSystem& system,
+                    const RunSummary& summary, const RunRecord& record) {
+  WritePage(folder / "report.html", MakeRunPage(title, system, summary, record));
+}
+
+}  // namespace dynamic_slam

@@ -1,0 +1,47 @@
+#include "dynamic_slam/report/frame_choice.h"
+
+#include <algorithm>
+
+#include <fmt/core.h>
+
+#include "dynamic_slam/report/frame_picture.h"
+
+namespace dynamic_slam {
+namespace {
+
+// A frame takes the place of another only when objects take so much more of it, as drawing takes time.
+constexpr double kLarger = 1.2;
+constexpr size_t kUnknownStretch = 300;  // frames, where nobody knows how many there will be
+
+}  // namespace
+
+FrameChoice::FrameChoice(const Camera& raw_camera, const ImageOptions& options, int stretches)
+    : preparer_(raw_camera, options), stretches_(static_cast<size_t>(stretches)) {}
+
+size_t FrameChoice::StretchOf(const RunProgress& progress) const {
+  const size_t frame = progress.frame - 1;
+  const size_t stretch =
+      progress.frames_total > 0 ? frame * stretches_ / progress.frames_total : frame / kUnknownStretch;
+  return std::min(stretch, stretches_ - 1);
+}
+
+void FrameChoice::Watch(const RunProgress& progress) {
+  const size_t stretch = StretchOf(progress);
+  double area_px = 0;
+  for (const DynamicBox& box : progress.result->objects.boxes) {
+    if (box.is_dynamic) area_px += box.box.Area();
+  }
+  const bool is_new = frames_.empty() || stretch != stretch_;
+  if (!is_new && area_px <= kLarger * most_area_px_) return;
+  if (is_new) frames_.emplace_back();
+  stretch_ = stretch;
+  most_area_px_ = area_px;
+  ChosenFrame& chosen = frames_.back();
+  preparer_.PrepareColour(progress.image->image, &chosen.picture);
+  DrawFrame(progress, &chosen.picture);
+  const TrackingResult& tracking = progress.result->tracking;
+  chosen.caption = fmt::format("frame {}: {}, {} of {} keypoints in dynamic boxes", progress.frame - 1,
+                               Name(tracking.state), tracking.dynamic.InBoxes(), tracking.keypoints);
+}
+
+}  // namespace dynamic_slam
