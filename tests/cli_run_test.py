@@ -12,7 +12,8 @@ import unittest
 PROGRAM = ""
 FRAMES = 100
 
-RESULTS = ["config.yaml", "frames.csv", "keyframes.txt", "loops.csv", "map.ply", "summary.json", "trajectory.png", "trajectory.txt"]
+RESULTS = ["config.yaml", "frames.csv", "keyframes.txt", "loops.csv", "map.ply", "report.html", "summary.json",
+           "trajectory.png", "trajectory.txt"]
 SUMMARY_KEYS = ["frames_total", "frames_tracked", "frames_backfilled", "coverage", "keyframes", "landmarks",
                 "initialised_at", "lost_count", "tracking_ms", "startup_s", "wall_s", "peak_rss_mb", "mode", "seed",
                 "version"]
