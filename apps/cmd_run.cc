@@ -143,12 +143,13 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = arguments.source;
   console.End();
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
-  if (viewer.has_value()) viewer->Finish(system);
-#endif
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   WriteResults(out, system, summary);
+#ifdef DYNAMIC_SLAM_HAS_VIEWER
+  // After the results: a recording that cannot be written must not take them along.
+  if (viewer.has_value()) viewer->Finish(system);
+#endif
   if (!arguments.save_map.empty() && summary.failure == nullptr) {
     WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
   }

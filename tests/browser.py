@@ -103,8 +103,9 @@ class Page:
         return result["result"].get("value")
 
     def wait_for(self, expression):
-        script = ("new Promise(done => { const look = () => { if (%s) done(true); else setTimeout(look, 20); }; look(); })")
-        self.evaluate(script % expression)
+        """Until the expression holds; a page that is still loading does not know its names."""
+        self.evaluate("new Promise(done => { const holds = () => { try { return %s; } catch { return false; } }; const look = "
+                      "() => { if (holds()) done(true); else setTimeout(look, 20); }; look(); })" % expression)
 
     def resize(self, width, height):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)

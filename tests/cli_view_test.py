@@ -4,6 +4,7 @@ The part with a browser is skipped where there is no Chromium.
 """
 
 import base64
+import contextlib
 import os
 import re
 import shutil
@@ -268,7 +269,14 @@ class PageTest(Sequence):
         self.assertEqual(page.problems, [])
 
     def test_a_run_is_watched_paused_stepped_saved_and_reset(self):
-        with self.start("--mode", "realtime", name="live") as viewer, browser.Page(viewer.url) as page:
+        with contextlib.ExitStack() as stack:
+            viewer = stack.enter_context(self.start("--mode", "realtime", name="live"))
+            holder, _ = viewer.open_websocket()
+            holder.sendall(masked(b"pause"))  # a browser may take longer to start than the run lasts
+            page = stack.enter_context(browser.Page(viewer.url))
+            page.wait_for("page.live.readyState === 1 && page.paused")
+            holder.close()
+            page.evaluate("document.querySelector('[data-command=resume]').click()")
             page.wait_for("page.facts && page.facts.keyframes >= 3 && document.body.dataset.state === 'tracking'")
             page.evaluate("document.querySelector('[data-command=pause]').click()")
             page.wait_for("page.paused")
