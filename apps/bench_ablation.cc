@@ -55,9 +55,8 @@ Outcome RunVariant(const BenchArguments& arguments, const std::string& source, c
   const BenchRun run = RunForBench(arguments, source, variant.assignments, console);
   Outcome outcome{source, variant.name, run.summary.Coverage(), run.system->FrameTrajectory(), {}, 0, {}};
   outcome.tracking_ms = run.summary.tracking_ms.median;
-  const std::optional<Trajectory> truth = LoadGroundTruth(source);
-  if (truth.has_value() && outcome.trajectory.size() > 2) {
-    outcome.truth = CompareWithTruth(*truth, outcome.trajectory);
+  if (run.record.truth.has_value() && outcome.trajectory.size() > 2) {
+    outcome.truth = CompareWithTruth(*run.record.truth, outcome.trajectory);
   }
   return outcome;
 }

@@ -16,7 +16,6 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/eval/place_recognition.h"
 #include "dynamic_slam/features/place_index.h"
-#include "dynamic_slam/io/trajectory_file.h"
 #include "truth_report.h"
 
 namespace dynamic_slam {
@@ -132,7 +131,7 @@ Outcome RunVariant(const LoopsArguments& arguments, const std::string& source, b
       RunForBench(arguments, source, {closing ? "loop.enabled=true" : "loop.enabled=false"}, console);
   Outcome outcome{source, closing ? "with" : "without", run.summary.Coverage(), {}, run.summary.loops, {}, 0,
                   {}};
-  const std::optional<Trajectory> truth = LoadGroundTruth(source);
+  const std::optional<Trajectory>& truth = run.record.truth;
   const Trajectory estimate = run.system->FrameTrajectory();
   if (!truth.has_value() || estimate.size() < 3) return outcome;
   outcome.truth = CompareWithTruth(*truth, estimate);

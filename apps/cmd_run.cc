@@ -24,9 +24,7 @@
 #include "overlay_writer.h"
 #include "run_console.h"
 #include "run_recorder.h"
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
 #include "run_viewer.h"
-#endif
 #include "source_arguments.h"
 #include "truth_report.h"
 
@@ -50,9 +48,7 @@ struct RunArguments {
   std::optional<double> detector_latency_ms;
   FrameSourceOptions source_options;
   bool quiet = false;
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
   ViewerArguments viewer;
-#endif
 };
 
 std::filesystem::path OutputFolder(const RunArguments& arguments) {
@@ -125,20 +121,16 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.overlay.empty()) {
     overlay.emplace(arguments.overlay, camera, options.image);
   }
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
   std::optional<RunViewer> viewer;
   if (arguments.viewer.IsWanted()) {
     viewer.emplace(arguments.viewer, out, out.filename().string(), camera, options, system.mode());
   }
-#endif
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
     recorder.Watch(progress);
     if (overlay.has_value()) overlay->Write(progress);
     if (masks.has_value()) masks->Write(*progress.image, *progress.result);
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
     if (viewer.has_value()) viewer->Watch(progress, &system, control.should_stop);
-#endif
   };
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = arguments.source;
@@ -146,10 +138,6 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   WriteResults(out, system, summary);
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
-  // After the results: a recording that cannot be written must not take them along.
-  if (viewer.has_value()) viewer->Finish(system);
-#endif
   if (!arguments.save_map.empty() && summary.failure == nullptr) {
     WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
   }
@@ -160,6 +148,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.trace.empty()) EndTrace(arguments.trace);
   if (!arguments.save_map.empty() && summary.failure == nullptr) fmt::print("map: {}\n", arguments.save_map);
   fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
+  // After all results: a recording that cannot be written must not take them along.
+  if (viewer.has_value()) viewer->Finish(system);
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
@@ -211,10 +201,7 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                       "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
   command->add_option("--truth", a.truth,
                       "Ground truth, in TUM's or KITTI's format (default: that beside the images)");
-#ifdef DYNAMIC_SLAM_HAS_VIEWER
-  AddServerOptions(command, "--viewer", &a.viewer);
-  command->add_flag("--record", a.viewer.is_recorded, "Record the run for `dynamic_slam view`");
-#endif
+  AddViewerOptions(command, &a.viewer);
   AddSourceOptions(command, &a.source_options);
   command->add_flag("--quiet", a.quiet, "No progress line");
   command->footer(

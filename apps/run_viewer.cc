@@ -24,6 +24,11 @@ LiveViewOptions ViewOptions(const ViewerArguments& arguments, const std::filesys
 
 }  // namespace
 
+void AddViewerOptions(CLI::App* command, ViewerArguments* arguments) {
+  AddServerOptions(command, "--viewer", arguments);
+  command->add_flag("--record", arguments->is_recorded, "Record the run for `dynamic_slam view`");
+}
+
 void AddServerOptions(CLI::App* command, const std::string& port_option, ViewerArguments* arguments) {
   command
       ->add_option_function<uint16_t>(

@@ -7,6 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
+#ifdef DYNAMIC_SLAM_HAS_VIEWER
+
 #include "dynamic_slam/viewer/live_view.h"
 
 namespace dynamic_slam {
@@ -18,6 +20,9 @@ struct ViewerArguments {
 
   bool IsWanted() const { return port.has_value() || is_recorded; }
 };
+
+// The options of `run`.
+void AddViewerOptions(CLI::App* command, ViewerArguments* arguments);
 
 // --viewer-address, and the port under the name that is given.
 void AddServerOptions(CLI::App* command, const std::string& port_option, ViewerArguments* arguments);
@@ -42,3 +47,23 @@ class RunViewer {
 };
 
 }  // namespace dynamic_slam
+
+#else  // built without the view: no option asks for it
+
+namespace dynamic_slam {
+
+struct ViewerArguments {
+  bool IsWanted() const { return false; }
+};
+
+inline void AddViewerOptions(CLI::App*, ViewerArguments*) {}
+
+struct RunViewer {
+  explicit RunViewer(const auto&...) {}
+  void Watch(const auto&...) {}
+  void Finish(const auto&) {}
+};
+
+}  // namespace dynamic_slam
+
+#endif

@@ -54,6 +54,7 @@ void MapLocaliser::Anchor(Frame* frame) const {
 void MapLocaliser::FindCandidates(const Frame& frame) {
   candidates_.clear();
   if (map_->Read()->keyframes().size() == 0) return;
+  // Without the map, which others may want to change meanwhile.
   const std::vector<uint64_t> words =
       PlaceWords(frame.features, frame.static_probability, kMinStaticProbability);
   std::vector<KeyframeId> youngest;
