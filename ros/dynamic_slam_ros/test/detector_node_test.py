@@ -2,15 +2,12 @@
 
 import collections
 import os
-import random
 import subprocess
 import sys
-import threading
-import time
 import unittest
 
 import ros_graph
-from ros_graph import Listener, wait_until
+from ros_graph import Listener, Network, Relay, pose_tuple, wait_until
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -34,64 +31,6 @@ def run(program, *arguments):
     return result.stdout
 
 
-class Network:
-    """A network namespace whose one cable ends here."""
-
-    HERE, THERE = "10.213.77.1", "10.213.77.2"
-
-    def __init__(self):
-        self.name = f"ds{os.getpid() % 100000}"
-        commands = (f"netns add {self.name}", f"link add {self.name}a type veth peer name {self.name}b",
-                    f"link set {self.name}b netns {self.name}", f"addr add {self.HERE}/30 dev {self.name}a",
-                    f"link set {self.name}a up", f"-n {self.name} addr add {self.THERE}/30 dev {self.name}b",
-                    f"-n {self.name} link set {self.name}b up", f"-n {self.name} link set lo up")
-        self.problem = ""
-        for command in commands:
-            try:
-                result = subprocess.run(["ip", *command.split()], capture_output=True, text=True)
-            except FileNotFoundError:
-                self.problem = "there is no ip (iproute2)"
-                return
-            if result.returncode != 0:
-                self.problem = f"ip {command}: {result.stderr.strip()}"
-                return
-
-    def end(self):
-        subprocess.run(["ip", "link", "del", f"{self.name}a"], capture_output=True)
-        subprocess.run(["ip", "netns", "del", self.name], capture_output=True)
-
-
-class Relay:
-    """Passes detections on after a delay, and loses a share of them."""
-
-    def __init__(self, source, target, delay_s, lost, seed=5):
-        self.draw, self.lost, self.delay_s = random.Random(seed), lost, delay_s
-        self.waiting, self.passed, self.dropped = collections.deque(), 0, 0
-        self.publisher = rospy.Publisher(target, Detections, queue_size=10)
-        self.ended = threading.Event()
-        self.thread = threading.Thread(target=self.pass_on, daemon=True)
-        self.thread.start()
-        self.subscriber = rospy.Subscriber(source, Detections, self.take)
-
-    def take(self, message):
-        if self.draw.random() < self.lost:
-            self.dropped += 1
-        else:
-            self.waiting.append((time.monotonic() + self.delay_s, message))
-
-    def pass_on(self):
-        while not self.ended.wait(0.002):
-            while self.waiting and self.waiting[0][0] <= time.monotonic():
-                self.publisher.publish(self.waiting.popleft()[1])
-                self.passed += 1
-
-    def end(self):
-        self.subscriber.unregister()
-        self.ended.set()
-        self.thread.join()
-        self.publisher.unregister()
-
-
 def setUpModule():
     global GRAPH, NETWORK, SEQUENCE, BAG
     NETWORK = Network()
@@ -108,11 +47,7 @@ def tearDownModule():
 
 class DetectorNodeTest(unittest.TestCase):
     def tearDown(self):
-        for node in GRAPH.nodes[1:]:
-            node.stop()
-        for name in ("/slam_node", "/detector_node"):
-            if rospy.has_param(name):
-                rospy.delete_param(name)
+        GRAPH.stop_nodes()
 
     def listen(self, topic, kind):
         listener = Listener(topic, kind)
@@ -125,29 +60,13 @@ class DetectorNodeTest(unittest.TestCase):
                            "_compressed:=true", "_detector:=ros", *arguments)
 
     @staticmethod
-    def start_detector(*arguments, far_away=False):
-        arguments = (f"_detector:=boxes:{SEQUENCE}/boxes.csv", *arguments)
-        if not far_away:
-            return GRAPH.start("detector_node", *arguments)
-        return GRAPH.start("/usr/sbin/ip", "netns", "exec", NETWORK.name, os.path.join(BUILD, "detector_node"),
-                           *arguments, environment={"ROS_IP": Network.THERE})
-
-    def wait_for_pair(self):
-        import rosgraph
-        master = rosgraph.Master(rospy.get_name())
-
-        def is_complete():
-            publishers, subscribers, _ = master.getSystemState()
-            return ("/detector/detections" in dict(publishers) and "/detector/detections" in dict(subscribers) and
-                    "/detector/image/compressed" in dict(subscribers))
-        wait_until(is_complete, "both nodes are there")
+    def start_detector(*arguments, network=None):
+        return GRAPH.start("detector_node", f"_detector:=boxes:{SEQUENCE}/boxes.csv", *arguments, network=network)
 
     def check_run(self, objects, poses):
         """What a run with a good detector has: nearly all poses, of a small error, and its objects."""
         truth = horn.read_tum(os.path.join(SEQUENCE, "groundtruth.txt"))
-        estimate = [(m.header.stamp.to_sec(), (m.pose.position.x, m.pose.position.y, m.pose.position.z),
-                     (m.pose.orientation.w, m.pose.orientation.x, m.pose.orientation.y, m.pose.orientation.z))
-                    for m in poses.messages]
+        estimate = [pose_tuple(m) for m in poses.messages]
         self.assertGreater(len(estimate), 0.3 * FRAMES)
         since_start = sum(stamp >= estimate[0][0] - 1e-6 for stamp, *_ in truth)
         self.assertGreaterEqual(len(estimate), 0.95 * since_start)
@@ -158,7 +77,7 @@ class DetectorNodeTest(unittest.TestCase):
 
     def play_and_check(self):
         objects, poses = self.listen("/slam_node/objects", Objects), self.listen("/slam_node/pose", PoseStamped)
-        self.wait_for_pair()
+        GRAPH.wait_for_detector()
         self.assertEqual(GRAPH.play(BAG, "-r", "0.5").wait(), 0)
         self.check_run(objects, poses)
         return collections.Counter(m.detector_state for m in objects.messages)
@@ -173,8 +92,8 @@ class DetectorNodeTest(unittest.TestCase):
     def test_in_a_network_of_its_own_with_delays_and_losses(self):
         if NETWORK.problem:
             self.skipTest(f"no network namespace: {NETWORK.problem}")
-        self.start_detector("detector/detections:=/far/detections", far_away=True)
-        relay = Relay("/far/detections", "/detector/detections", delay_s=0.08, lost=0.05)
+        self.start_detector("detector/detections:=/far/detections", network=NETWORK)
+        relay = Relay(Detections, "/far/detections", "/detector/detections", delay_s=0.08, lost=0.05)
         self.addCleanup(relay.end)
         self.start_slam()
         states = self.play_and_check()
@@ -195,7 +114,7 @@ class DetectorNodeTest(unittest.TestCase):
 
         detector = self.start_detector()
         self.start_slam()
-        self.wait_for_pair()
+        GRAPH.wait_for_detector()
         GRAPH.play(BAG, "-r", "0.2")
         more(poses)
         wait_until(lambda: detector_says(DiagnosticStatus.OK, "answers"), "all is well")
