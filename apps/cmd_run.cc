@@ -1,5 +1,6 @@
 #include "cmd_run.h"
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,9 +16,11 @@
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
+#include "dynamic_slam/io/fault_injection.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/map/map_file.h"
+#include "dynamic_slam/system/run_journal.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
 #include "mask_folder.h"
@@ -45,6 +48,8 @@ struct RunArguments {
   std::string overlay, masks, export_masks;
   std::string save_map, load_map;
   bool localise_only = false, no_backfill = false;
+  std::string faults;
+  double save_map_every_min = 0;
   std::optional<double> detector_latency_ms;
   FrameSourceOptions source_options;
   bool quiet = false;
@@ -70,6 +75,9 @@ void EndTrace(const std::string& file) {
 
 // What the options say of maps between runs.
 void CheckMapOptions(const RunArguments& arguments, const SystemOptions& options) {
+  if (arguments.save_map_every_min > 0 && arguments.save_map.empty()) {
+    throw InputError("--save-map-every", "no map is saved", "Name the file with --save-map.");
+  }
   if (!options.tracker.localise_only) return;
   if (arguments.load_map.empty()) {
     throw InputError("--localise-only", "there is no map to localise in", "Give one with --load-map FILE.");
@@ -78,6 +86,35 @@ void CheckMapOptions(const RunArguments& arguments, const SystemOptions& options
     throw InputError("--save-map", "the map does not change with --localise-only", "Leave one of them out.");
   }
 }
+
+// Saves the map every few minutes, so that little of it is lost with a program that is killed.
+class Checkpoint {
+ public:
+  // every_min: 0: never.
+  Checkpoint(std::string file, double every_min) : file_(std::move(file)), every_min_(every_min) {}
+
+  void SaveIfDue(const SlamSystem& system) {
+    const auto now = std::chrono::steady_clock::now();
+    if (every_min_ == 0 || std::chrono::duration<double, std::ratio<60>>(now - last_).count() < every_min_)
+      return;
+    last_ = now;
+    try {
+      std::string bytes;
+      {
+        const auto map = system.map().Read();
+        bytes = EncodeMap(system.camera(), *map);
+      }
+      WriteFileAtomically(file_, bytes);
+    } catch (const InputError& error) {
+      fmt::print(stderr, "warning: {}\n", error.what());
+    }
+  }
+
+ private:
+  std::string file_;
+  double every_min_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
 
 void RunSource(const RunArguments& arguments, int* exit_code) {
   TraceThreadName("main");
@@ -90,7 +127,10 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   options.backfill &= !arguments.no_backfill;
   CheckMapOptions(arguments, options);
   const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
-  const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
+  std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
+  if (!arguments.faults.empty()) {
+    source = InjectFaults(std::move(source), ParseFaults(arguments.faults, "--inject"));
+  }
   const Camera camera = ChooseCamera(arguments.camera, arguments.source, *source);
   const std::filesystem::path out = OutputFolder(arguments);
   std::optional<Trajectory> truth;
@@ -125,8 +165,14 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (arguments.viewer.IsWanted()) {
     viewer.emplace(arguments.viewer, out, out.filename().string(), camera, options, system.mode());
   }
+  RunJournal journal(out);
+  Checkpoint checkpoint(arguments.save_map, arguments.save_map_every_min);
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
+    const Frame& frame = *progress.frame_in_work;
+    journal.Add(*progress.record, progress.map->Read()->PartOf(frame.reference),
+                frame.cam_from_world.Inverse());
+    checkpoint.SaveIfDue(system);
     recorder.Watch(progress);
     if (overlay.has_value()) overlay->Write(progress);
     if (masks.has_value()) masks->Write(*progress.image, *progress.result);
@@ -138,6 +184,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   WriteResults(out, system, summary);
+  journal.Remove();
   if (!arguments.save_map.empty() && summary.failure == nullptr) {
     WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
   }
@@ -191,6 +238,10 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
   command->add_option("--save-map", a.save_map, "File for the map, for later runs and `dynamic_slam map`");
+  command
+      ->add_option("--save-map-every", a.save_map_every_min,
+                   "Minutes after which --save-map is written while the run goes on (0: only at its end)")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--load-map", a.load_map,
                       "Map of an earlier run with the same camera: it is looked for first, and grows");
   command->add_flag("--localise-only", a.localise_only,
@@ -203,6 +254,10 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                       "Ground truth, in TUM's or KITTI's format (default: that beside the images)");
   AddViewerOptions(command, &a.viewer);
   AddSourceOptions(command, &a.source_options);
+  command->add_option(
+      "--inject", a.faults,
+      "Faults of the camera, to see what becomes of a run: drop=0.05,black=0.02,from=2,to=4; also "
+      "blur, exposure, freeze, resize, stamp, swap (shares of the frames), seed");
   command->add_flag("--quiet", a.quiet, "No progress line");
   command->footer(
       "Examples:\n"

@@ -12,6 +12,7 @@
 #include "cmd_eval.h"
 #include "cmd_map.h"
 #include "cmd_models.h"
+#include "cmd_recover.h"
 #include "cmd_run.h"
 #include "cmd_simulate.h"
 #ifdef DYNAMIC_SLAM_HAS_VIEWER
@@ -33,6 +34,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = 0;
   dynamic_slam::AddRunCommand(app, &exit_code);
+  dynamic_slam::AddRecoverCommand(app);
   dynamic_slam::AddEvalCommand(app);
   dynamic_slam::AddDetectCommand(app, &exit_code);
   dynamic_slam::AddMapCommand(app);

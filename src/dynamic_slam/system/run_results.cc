@@ -92,19 +92,6 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   return json;
 }
 
-std::string FramesCsv(const std::vector<RunSummary::FrameRecord>& frames) {
-  std::string csv =
-      "timestamp,state,keypoints,inliers,keyframe,detection,objects,static,dynamic,culled,kept,tracking_ms,"
-      "reason\n";
-  for (const RunSummary::FrameRecord& frame : frames) {
-    csv += fmt::format("{:.9f},{},{},{},{},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s,
-                       Name(frame.state), frame.keypoints, frame.inliers, Name(frame.keyframe_reason),
-                       Name(frame.detection), frame.objects, frame.dynamic.outside, frame.dynamic.InBoxes(),
-                       frame.dynamic.culled, frame.dynamic.kept, frame.tracking_ms, frame.reason);
-  }
-  return csv;
-}
-
 std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
   std::string csv =
       "timestamp,keyframe,candidate,candidate_timestamp,score,matches,sim3_inliers,visible,inliers,"
@@ -131,21 +118,33 @@ std::vector<Eigen::Vector3f> LandmarksOfMainPart(const SlamSystem& system) {
   return points;
 }
 
-// Those of further parts of the map; files of an earlier run in the folder go.
-void WriteFurtherTrajectories(const std::filesystem::path& folder, const SlamSystem& system) {
-  const std::vector<PartId> parts = system.Parts();
+}  // namespace
+
+std::string FramesCsvHeader() {
+  return "timestamp,state,keypoints,inliers,keyframe,detection,objects,static,dynamic,culled,kept,tracking_"
+         "ms,"
+         "reason\n";
+}
+
+std::string FramesCsvRow(const RunSummary::FrameRecord& frame) {
+  return fmt::format("{:.9f},{},{},{},{},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s,
+                     Name(frame.state), frame.keypoints, frame.inliers, Name(frame.keyframe_reason),
+                     Name(frame.detection), frame.objects, frame.dynamic.outside, frame.dynamic.InBoxes(),
+                     frame.dynamic.culled, frame.dynamic.kept, frame.tracking_ms, frame.reason);
+}
+
+void WriteTrajectories(const std::filesystem::path& folder, std::span<const Trajectory> trajectories) {
+  WriteTumTrajectory(folder / "trajectory.txt", trajectories.empty() ? Trajectory() : trajectories.front());
   for (size_t i = 1;; ++i) {
     const std::filesystem::path file = folder / fmt::format("trajectory_{}.txt", i + 1);
     std::error_code ignored;
-    if (i < parts.size()) {
-      WriteTumTrajectory(file, system.FrameTrajectory(parts[i]));
+    if (i < trajectories.size()) {
+      WriteTumTrajectory(file, trajectories[i]);
     } else if (!std::filesystem::remove(file, ignored)) {
       return;
     }
   }
 }
-
-}  // namespace
 
 TimeStatistics SummariseTimes(std::vector<double> times) {
   if (times.empty()) return {};
@@ -181,8 +180,9 @@ void PrepareOutputFolder(const std::filesystem::path& folder) {
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary) {
   PrepareOutputFolder(folder);
   const Trajectory trajectory = system.FrameTrajectory();
-  WriteTumTrajectory(folder / "trajectory.txt", trajectory);
-  WriteFurtherTrajectories(folder, system);
+  std::vector<Trajectory> trajectories;
+  for (const PartId part : system.Parts()) trajectories.push_back(system.FrameTrajectory(part));
+  WriteTrajectories(folder, trajectories);
   WriteTumTrajectory(folder / "keyframes.txt", system.KeyframeTrajectory());
   const std::filesystem::path kitti = folder / "trajectory_kitti.txt";
   std::error_code ignored;
@@ -192,7 +192,9 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
     for (const StampedPose& pose : trajectory) poses.push_back(pose.world_from_cam);
     WriteKittiPoses(kitti, poses);
   }
-  WriteFileAtomically(folder / "frames.csv", FramesCsv(summary.frames));
+  std::string frames = FramesCsvHeader();
+  for (const RunSummary::FrameRecord& frame : summary.frames) frames += FramesCsvRow(frame);
+  WriteFileAtomically(folder / "frames.csv", frames);
   WriteFileAtomically(folder / "loops.csv", LoopsCsv(summary.loops.attempts));
   WritePly(folder / "map.ply", LandmarksOfMainPart(system));
   WriteFileAtomically(folder / "config.yaml", OptionsToYaml(system.options()));

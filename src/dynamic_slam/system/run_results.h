@@ -4,6 +4,7 @@
 #include <exception>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,14 @@ std::string FailureMessage(const RunSummary& summary);
 // loops.csv, map.ply, config.yaml, summary.json and, for a KITTI source in which every frame has a pose,
 // trajectory_kitti.txt into the folder, which is made. Throws InputError when that is not possible.
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);
+
+// trajectory.txt, and trajectory_2.txt and so on; those of an earlier run in the folder go. Throws
+// InputError.
+void WriteTrajectories(const std::filesystem::path& folder, std::span<const Trajectory> trajectories);
+
+// frames.csv, line by line.
+std::string FramesCsvHeader();
+std::string FramesCsvRow(const RunSummary::FrameRecord& frame);
 
 // Makes the folder and checks that files can be written there, so that a long run does not end in an error.
 void PrepareOutputFolder(const std::filesystem::path& folder);

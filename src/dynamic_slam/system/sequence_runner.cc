@@ -120,8 +120,8 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
           system.Process(image->timestamp_s, image->image, control.mask ? control.mask(*image) : cv::Mat());
       log.Add(image->timestamp_s, result, system.map());
       if (control.on_frame)
-        control.on_frame({summary.frames.size(), announced, &*image, &result, &system.frame(), &system.map(),
-                          system.detector()});
+        control.on_frame({summary.frames.size(), announced, &*image, &result, &summary.frames.back(),
+                          &system.frame(), &system.map(), system.detector()});
     }
     end_feed();
     if (summary.interrupted) system.Stop();

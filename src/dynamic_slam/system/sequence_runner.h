@@ -14,6 +14,7 @@ struct RunProgress {
   size_t frames_total = 0;  // 0 when unknown
   const SourceImage* image = nullptr;
   const FrameResult* result = nullptr;
+  const RunSummary::FrameRecord* record = nullptr;
   const Frame* frame_in_work = nullptr;  // keypoints and what became of them
   const SharedMap* map = nullptr;
   const Detector* detector = nullptr;  // that named the objects of the result; none without one

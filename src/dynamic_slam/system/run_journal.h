@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "dynamic_slam/geometry/trajectory.h"
+#include "dynamic_slam/system/run_results.h"
+
+namespace dynamic_slam {
+
+// A file beside the results to which each frame goes when it is done, so that a program that is killed takes
+// no more along than the frame in work. Poses are those of the moment: what the map learned later is not in
+// them.
+class RunJournal {
+ public:
+  static constexpr const char* kFileName = "journal.csv";
+
+  // Throws InputError when the file cannot be written.
+  explicit RunJournal(std::filesystem::path folder);
+
+  // part, world_from_cam: of a frame that has a pose. A disk that is full ends the journal, not the run.
+  void Add(const RunSummary::FrameRecord& record, PartId part, const Rigid3& world_from_cam);
+
+  // The results are written: nothing is left to recover.
+  void Remove();
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream stream_;
+};
+
+struct RecoveredRun {
+  size_t frames = 0;
+  std::string frames_csv;
+  std::vector<Trajectory> trajectories;  // of each part of the map, that with most frames first
+};
+
+// What the journal in the folder of a run tells. Its last line may be cut off. Throws InputError when there
+// is none, or it is none.
+RecoveredRun ReadJournal(const std::filesystem::path& folder);
+
+}  // namespace dynamic_slam
