@@ -221,7 +221,7 @@ void SlamNode::TakeImage(const std_msgs::Header& message_header, const cv::Mat& 
 void SlamNode::Forget() {
   system_->Reset();
   if (system_->options().tracker.localise_only) system_->SetLocaliseOnly(false);
-  outputs_->Break();
+  outputs_->Forget();
   failure_.clear();
   tracking_ = {};
   told_ = {};
@@ -297,7 +297,7 @@ void SlamNode::AddServices() {
       "get_trajectory",
       [this](const GetTrajectory::Request&, GetTrajectory::Response* response) {
         for (const PartId part : system().Parts()) {
-          response->parts.push_back(outputs_->Path(system().FrameTrajectory(part)));
+          response->parts.push_back(outputs_->Path(system().FrameTrajectory(part), part));
         }
         return fmt::format("{} parts", response->parts.size());
       },
