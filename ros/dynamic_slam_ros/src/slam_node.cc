@@ -1,7 +1,8 @@
 // Dynamic-SLAM as a node: images in; poses, map and what is known of moving objects out. README.md has the
 // topics.
 //
-// Everything runs on the thread that spins, images and services in turn, but what SlamSystem has threads for.
+// Everything runs on the thread that spins, images and services in turn, but what SlamSystem and ImageInput
+// have threads for.
 
 #include <algorithm>
 #include <memory>
@@ -125,7 +126,7 @@ SlamNode::SlamNode() {
   updater_.add("tracking", this, &SlamNode::DescribeTracking);
   updater_.add("detector", this, &SlamNode::DescribeDetector);
   updater_.add("images", this, &SlamNode::DescribeImages);
-  input_.emplace(&node_, "image", options_.compressed, kWaitingImages,
+  input_.emplace("image", options_.compressed, kWaitingImages,
                  [this](const auto& header, const auto& image, const auto& reason) {
                    TakeImage(header, image, reason);
                  });
