@@ -41,7 +41,7 @@ int Run() {
   uint32_t count = 0;
   // Only the newest image waits: an answer that is late helps less than the next one.
   const ImageInput input(
-      &node, "detector/image", options.compressed, 1,
+      "detector/image", options.compressed, 1,
       [&](const std_msgs::Header& header, const cv::Mat& image, const std::string& reason) {
         dynamic_slam_ros::Detections answer;
         answer.header = header;

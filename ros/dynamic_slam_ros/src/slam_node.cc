@@ -1,7 +1,8 @@
 // Dynamic-SLAM as a node: images in; poses, map and what is known of moving objects out. README.md has the
 // topics.
 //
-// Everything runs on the thread that spins, images and services in turn, but what SlamSystem has threads for.
+// Everything runs on the thread that spins, images and services in turn, but what SlamSystem and ImageInput
+// have threads for.
 
 #include <algorithm>
 #include <memory>
@@ -125,7 +126,7 @@ SlamNode::SlamNode() {
   updater_.add("tracking", this, &SlamNode::DescribeTracking);
   updater_.add("detector", this, &SlamNode::DescribeDetector);
   updater_.add("images", this, &SlamNode::DescribeImages);
-  input_.emplace(&node_, "image", options_.compressed, kWaitingImages,
+  input_.emplace("image", options_.compressed, kWaitingImages,
                  [this](const auto& header, const auto& image, const auto& reason) {
                    TakeImage(header, image, reason);
                  });
@@ -221,7 +222,7 @@ void SlamNode::TakeImage(const std_msgs::Header& message_header, const cv::Mat& 
 void SlamNode::Forget() {
   system_->Reset();
   if (system_->options().tracker.localise_only) system_->SetLocaliseOnly(false);
-  outputs_->Break();
+  outputs_->Forget();
   failure_.clear();
   tracking_ = {};
   told_ = {};
@@ -297,7 +298,7 @@ void SlamNode::AddServices() {
       "get_trajectory",
       [this](const GetTrajectory::Request&, GetTrajectory::Response* response) {
         for (const PartId part : system().Parts()) {
-          response->parts.push_back(outputs_->Path(system().FrameTrajectory(part)));
+          response->parts.push_back(outputs_->Path(system().FrameTrajectory(part), part));
         }
         return fmt::format("{} parts", response->parts.size());
       },

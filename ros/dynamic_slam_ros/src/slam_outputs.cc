@@ -85,11 +85,20 @@ bool SlamOutputs::FindBase(const std::string& camera_frame) {
   return problem_.empty();
 }
 
+void SlamOutputs::Forget() {
+  path_.Break();
+  map_from_world_.clear();
+  part_ = {};
+}
+
 // The map's frame is where the base, or else the camera with a robot's axes, was in the first keyframe.
-Rigid3 SlamOutputs::MapFromBase(const Rigid3& world_from_cam) const {
-  const Rigid3 metric = Scaled(world_from_cam, options_.metres_per_unit);
-  if (options_.base_frame.empty()) return BodyFromOptical() * metric;
-  return base_from_cam_ * metric * base_from_cam_.Inverse();
+Rigid3 SlamOutputs::MapFromWorld(PartId part) const {
+  if (const auto known = map_from_world_.find(part); known != map_from_world_.end()) return known->second;
+  return options_.base_frame.empty() ? BodyFromOptical() : base_from_cam_;
+}
+
+Rigid3 SlamOutputs::MapFromBase(const Rigid3& world_from_cam, PartId part) const {
+  return MapFromWorld(part) * Scaled(world_from_cam, options_.metres_per_unit) * base_from_cam_.Inverse();
 }
 
 void SlamOutputs::PublishPose(const std_msgs::Header& header, const Frame& frame,
@@ -106,7 +115,16 @@ void SlamOutputs::PublishPose(const std_msgs::Header& header, const Frame& frame
     revision_ = map->revision();
     world_from_cam = map->PoseFromReference(frame.reference, frame.cam_from_reference).Inverse();
   }
-  const Rigid3 map_from_base = MapFromBase(world_from_cam);
+  if (!map_from_world_.contains(part_)) {
+    Rigid3 map_from_world = MapFromWorld(part_);
+    if (!map_from_world_.empty()) {
+      const Rigid3 map_from_base = path_.map_from_odom() * path_.odom_from_body();
+      map_from_world =
+          map_from_base * base_from_cam_ * Scaled(world_from_cam, options_.metres_per_unit).Inverse();
+    }
+    map_from_world_[part_] = map_from_world;
+  }
+  const Rigid3 map_from_base = MapFromBase(world_from_cam, part_);
   path_.Add(map_from_base, is_jump);
 
   geometry_msgs::PoseStamped pose;
@@ -192,24 +210,23 @@ std_msgs::Header SlamOutputs::MapHeader() const {
   return header;
 }
 
-nav_msgs::Path SlamOutputs::Path(const Trajectory& trajectory) const {
+nav_msgs::Path SlamOutputs::Path(const Trajectory& trajectory, PartId part) const {
   nav_msgs::Path path;
   path.header = MapHeader();
   path.poses.resize(trajectory.size());
   for (size_t i = 0; i < trajectory.size(); ++i) {
     path.poses[i].header.frame_id = options_.map_frame;
     path.poses[i].header.stamp = StampFromSeconds(trajectory[i].timestamp_s);
-    path.poses[i].pose = PoseMessage(MapFromBase(trajectory[i].world_from_cam));
+    path.poses[i].pose = PoseMessage(MapFromBase(trajectory[i].world_from_cam, part));
   }
   return path;
 }
 
 void SlamOutputs::PublishMap(const SlamSystem& system) {
   if (!part_.IsValid()) return;
-  if (path_topic_.getNumSubscribers() > 0) path_topic_.publish(Path(system.FrameTrajectory(part_)));
+  if (path_topic_.getNumSubscribers() > 0) path_topic_.publish(Path(system.FrameTrajectory(part_), part_));
   if (points_.getNumSubscribers() == 0 && keyframes_.getNumSubscribers() == 0) return;
-  // A rigid transform of the world, and a scale.
-  const Rigid3 map_from_world = options_.base_frame.empty() ? BodyFromOptical() : base_from_cam_;
+  const Rigid3 map_from_world = MapFromWorld(part_);
   std::vector<Eigen::Vector3f> points;
   geometry_msgs::PoseArray keyframes;
   keyframes.header = MapHeader();
@@ -221,7 +238,7 @@ void SlamOutputs::PublishMap(const SlamSystem& system) {
     });
     map->keyframes().ForEach([&](const Keyframe& keyframe) {
       if (keyframe.part() != part_) return;
-      keyframes.poses.push_back(PoseMessage(MapFromBase(keyframe.cam_from_world().Inverse())));
+      keyframes.poses.push_back(PoseMessage(MapFromBase(keyframe.cam_from_world().Inverse(), part_)));
     });
   }
   points_.publish(Cloud(points, MapHeader()));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -56,10 +57,11 @@ class SlamOutputs {
   // Points, keyframes and path of the part of the map in which the camera was last.
   void PublishMap(const SlamSystem& system);
 
-  nav_msgs::Path Path(const Trajectory& trajectory) const;
+  // The frames of a part of the map.
+  nav_msgs::Path Path(const Trajectory& trajectory, PartId part) const;
 
-  // The map was given up: the next pose has nothing to do with the last one.
-  void Break() { path_.Break(); }
+  // The map was emptied or replaced: the next pose has nothing to do with the last one.
+  void Forget();
 
   // Why there is no pose although the camera has one, or "".
   const std::string& problem() const { return problem_; }
@@ -70,7 +72,8 @@ class SlamOutputs {
   void PublishPicture(const std_msgs::Header& header, const cv::Mat& image, const FrameResult& result,
                       const SlamSystem& system);
   std_msgs::Header MapHeader() const;
-  Rigid3 MapFromBase(const Rigid3& world_from_cam) const;
+  Rigid3 MapFromWorld(PartId part) const;
+  Rigid3 MapFromBase(const Rigid3& world_from_cam, PartId part) const;
   bool FindBase(const std::string& camera_frame);
 
   OutputOptions options_;
@@ -79,9 +82,12 @@ class SlamOutputs {
   tf2_ros::TransformBroadcaster broadcaster_;
   tf2_ros::Buffer buffer_;
   std::optional<tf2_ros::TransformListener> listener_;  // with a base frame
-  Rigid3 base_from_cam_;
+  Rigid3 base_from_cam_;                                // without a base frame, that of the camera itself
   std::string problem_;
   ContinuousPath path_;
+  // Where the parts of the map are. Nobody knows what a later part has to do with the first one until they
+  // become one: it begins where the camera was last.
+  std::map<PartId, Rigid3> map_from_world_;
   PartId part_;
   uint32_t epoch_ = 0, revision_ = 0;  // of the map, at the last pose
   ros::Time last_stamp_;               // of the last pose
