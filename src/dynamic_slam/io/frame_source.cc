@@ -12,7 +12,9 @@
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/camera_import.h"
+#include "dynamic_slam/io/checked_source.h"
 #include "dynamic_slam/io/image_file.h"
+#include "dynamic_slam/io/live_source.h"
 #include "dynamic_slam/io/source_layout.h"
 
 namespace dynamic_slam {
@@ -21,68 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kDefaultFps = 30;
-
-// What all sources do alike: keep the first image, check size and stamp of each.
-class CheckedSource : public FrameSource {
- public:
-  CheckedSource(std::string layout, bool any_size) : layout_(std::move(layout)), any_size_(any_size) {}
-
-  std::optional<SourceImage> Next() final {
-    if (first_) return std::exchange(first_, std::nullopt);
-    SourceImage image;
-    std::string reason;
-    while (ReadNext(&image, &reason)) {
-      if (reason.empty()) reason = Refusal(image);
-      if (reason.empty()) {
-        last_stamp_s_ = image.timestamp_s;
-        return image;
-      }
-      problems_.push_back({image.name, std::exchange(reason, "")});
-    }
-    return std::nullopt;
-  }
-
-  std::string Layout() const final { return layout_; }
-  cv::Size ImageSize() const final { return size_; }
-  const std::vector<SourceProblem>& Problems() const final { return problems_; }
-
- protected:
-  // The next frame in order. false: there is none. *reason, empty at the call, is set when it cannot be read.
-  virtual bool ReadNext(SourceImage* image, std::string* reason) = 0;
-
-  // Reads the first image, which fixes the size. Throws InputError when there is none.
-  void ReadFirst(const fs::path& path) {
-    first_ = Next();
-    if (first_) return;
-    std::string reason = "no image of it can be read";
-    if (!problems_.empty()) reason += fmt::format(" (first: {}: {})", problems_[0].name, problems_[0].reason);
-    throw InputError(path.string(), reason, "Check the files, and --start and --max-frames where given.");
-  }
-
- private:
-  std::string Refusal(const SourceImage& image) {
-    if (!std::isfinite(image.timestamp_s)) return fmt::format("its stamp is {}", image.timestamp_s);
-    if (last_stamp_s_ && image.timestamp_s < *last_stamp_s_) {
-      return fmt::format("its stamp {:.6f} goes back behind {:.6f}", image.timestamp_s, *last_stamp_s_);
-    }
-    if (last_stamp_s_ && image.timestamp_s == *last_stamp_s_) {
-      return fmt::format("its stamp {:.6f} is a duplicate", image.timestamp_s);
-    }
-    if (size_.empty()) size_ = image.image.size();
-    if (!any_size_ && image.image.size() != size_) {
-      return fmt::format("its size is {} x {} px, that of the first image {} x {} px", image.image.cols,
-                         image.image.rows, size_.width, size_.height);
-    }
-    return "";
-  }
-
-  std::string layout_;
-  bool any_size_;
-  cv::Size size_;
-  std::optional<SourceImage> first_;
-  std::optional<double> last_stamp_s_;
-  std::vector<SourceProblem> problems_;
-};
 
 // A folder with a list of image files.
 class ListedSource : public CheckedSource {
@@ -213,6 +153,7 @@ std::unique_ptr<FrameSource> OpenFrameSource(const fs::path& path, const FrameSo
                                  options.start, options.max_frames),
                      "Leave out what is not needed.");
   }
+  if (IsLiveSource(path.string())) return OpenLiveSource(path.string(), options);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw InputError(path.string(), "there is no such file or folder", "Check the path.");
