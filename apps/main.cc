@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "cmd_bench.h"
+#include "cmd_calibrate.h"
 #include "cmd_config.h"
 #include "cmd_demo.h"
 #include "cmd_detect.h"
@@ -36,6 +37,7 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddEvalCommand(app);
   dynamic_slam::AddDetectCommand(app, &exit_code);
   dynamic_slam::AddMapCommand(app);
+  dynamic_slam::AddCalibrateCommand(app);
   dynamic_slam::AddModelsCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);
