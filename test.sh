@@ -22,6 +22,6 @@ if [[ -z "${DYNAMIC_SLAM_DATA:-}" && -d "$root/../shared/data" ]]; then
   export DYNAMIC_SLAM_DATA
 fi
 
-"$root/scripts/setup.sh" "$root/scripts/packages_test.txt"
+"$root/scripts/setup.sh" "$root/scripts/packages_test.txt" "$root/scripts/packages_ros.txt"
 "$root/scripts/build.sh" release
 ctest --test-dir "$root/build/release" -j2 --output-on-failure "${selection[@]}" "${arguments[@]}"

@@ -43,7 +43,7 @@ class FaultyExecutor : public Executor {
   void ThrowIfFailed() const override { executor_->ThrowIfFailed(); }
 
   Fault fault = Fault::kNone;  // of the tasks posted from now on
-  std::atomic<int> done = 0;  // in the lane of mapping
+  std::atomic<int> done = 0;   // in the lane of mapping
 
  private:
   std::unique_ptr<Executor> executor_;
@@ -98,6 +98,20 @@ TEST_P(LifecycleTest, RunsAndFinishesTwice) {
   EXPECT_TRUE(system_->Finish().usable);
   ExpectGood(kFrames);
   EXPECT_EQ(system_->mapping_report().times_ms.size(), static_cast<size_t>(executor_->done));
+}
+
+TEST_P(LifecycleTest, LocalisesOnlyAndThenGrowsAgain) {
+  EXPECT_THROW(system_->SetLocaliseOnly(true), InputError) << "without a map";
+  Play(8);
+  system_->SetLocaliseOnly(true);
+  const std::string map = EncodeMap(system_->camera(), *system_->map().Read());
+  for (int i = 8; i < 11; ++i) EXPECT_EQ(Process(i).tracking.state, TrackingState::kTracking) << i;
+  EXPECT_EQ(EncodeMap(system_->camera(), *system_->map().Read()), map);
+  system_->SetLocaliseOnly(false);
+  for (int i = 11; i < kFrames; ++i) Process(i);
+  system_->Finish();
+  EXPECT_NE(EncodeMap(system_->camera(), *system_->map().Read()), map);
+  ExpectGood(kFrames);
 }
 
 TEST_P(LifecycleTest, FinishesAndStopsBeforeTheFirstImage) {

@@ -200,10 +200,11 @@ std::vector<std::string> ReadYamlEntries(const std::filesystem::path& file,
   return assignments.Apply(name, "Correct the file and try again.");
 }
 
-void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::string> settings) {
+void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::string> settings,
+                     const std::string& what) {
   Assignments assignments(entries);
   for (const std::string& setting : settings) {
-    const std::string where = "--set " + setting;
+    const std::string where = what + " " + setting;
     const size_t equals = setting.find('=');
     if (equals == std::string::npos) {
       assignments.Problem(where, "write key=value");
@@ -219,7 +220,7 @@ void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::
       assignments.UnknownKey(where, key);
     }
   }
-  assignments.Apply("--set", "A run's config.yaml lists every key with its range.");
+  assignments.Apply(what, "A run's config.yaml lists every key with its range.");
 }
 
 void CheckEntryRanges(std::span<const OptionEntry> entries) {

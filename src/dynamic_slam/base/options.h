@@ -60,8 +60,9 @@ std::vector<std::string> ReadYamlEntries(const std::filesystem::path& file,
                                          std::span<const OptionEntry> entries,
                                          std::span<const std::string_view> required = {});
 
-// The same for assignments "key=value" from the command line; later ones win.
-void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::string> assignments);
+// The same for assignments "key=value" from the command line, or from where `what` says; later ones win.
+void ApplySetEntries(std::span<const OptionEntry> entries, std::span<const std::string> assignments,
+                     const std::string& what = "--set");
 
 // Whether it is a number with a range.
 bool HasRange(const OptionEntry& entry);

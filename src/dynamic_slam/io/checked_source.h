@@ -12,10 +12,10 @@ namespace dynamic_slam {
 // What all sources do alike: keep the first image, check size and stamp of each.
 class CheckedSource : public FrameSource {
  public:
+  // any_size: images of another size than the first are not skipped.
   CheckedSource(std::string layout, bool any_size) : layout_(std::move(layout)), any_size_(any_size) {}
 
   std::optional<SourceImage> Next() final;
-
   std::string Layout() const final { return layout_; }
   cv::Size ImageSize() const final { return size_; }
   const std::vector<SourceProblem>& Problems() const final { return problems_; }

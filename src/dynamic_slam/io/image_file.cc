@@ -79,8 +79,22 @@ bool IsTruncatedImage(const std::string& bytes) {
   return false;
 }
 
-cv::Mat ReadImage(const fs::path& file, std::string* reason) {
+cv::Mat DecodeImage(const std::string& bytes, std::string* reason) {
   DS_TRACE("io/decode");
+  if (bytes.empty()) return *reason = "the file is empty", cv::Mat();
+  if (IsTruncatedImage(bytes)) return *reason = "the image is truncated", cv::Mat();
+  cv::Mat image;
+  try {
+    image = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data())),
+                         cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) *reason = "the image cannot be decoded";
+  return image;
+}
+
+cv::Mat ReadImage(const fs::path& file, std::string* reason) {
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return *reason = "the file is missing", cv::Mat();
   std::string bytes;
@@ -89,17 +103,7 @@ cv::Mat ReadImage(const fs::path& file, std::string* reason) {
   } catch (const InputError&) {
     return *reason = "the file cannot be read", cv::Mat();
   }
-  if (bytes.empty()) return *reason = "the file is empty", cv::Mat();
-  if (IsTruncatedImage(bytes)) return *reason = "the image is truncated", cv::Mat();
-  cv::Mat image;
-  try {
-    image =
-        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data()), cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) *reason = "the image cannot be decoded";
-  return image;
+  return DecodeImage(bytes, reason);
 }
 
 bool HasImageExtension(const fs::path& file) {

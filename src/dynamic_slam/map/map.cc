@@ -161,6 +161,39 @@ void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id
   ++keyframe.landmark_count_;
 }
 
+void Map::LinkAll(LandmarkId id, std::vector<Observation> observations) {
+  Landmark& landmark = landmarks_.At(id);
+  DS_CHECK(landmark.observations_.empty(), "landmark={}", id.value());
+  for (const Observation& observation : observations) {
+    Keyframe& keyframe = keyframes_.At(observation.keyframe);
+    DS_CHECK(!keyframe.landmarks_.at(observation.keypoint).IsValid(), "keyframe={} keypoint={}",
+             observation.keyframe.value(), observation.keypoint);
+    keyframe.landmarks_[observation.keypoint] = id;
+    ++keyframe.landmark_count_;
+  }
+  landmark.observations_ = std::move(observations);
+}
+
+void Map::CountCovisibility() {
+  std::vector<int> shared(keyframes_.CreatedCount());  // with each keyframe; all 0 between keyframes
+  std::vector<KeyframeId> others;
+  keyframes_.ForEach([&](Keyframe& keyframe) {
+    others.clear();
+    for (const LandmarkId landmark : keyframe.landmarks_) {
+      if (!landmark.IsValid()) continue;
+      for (const Observation& other : landmarks_.At(landmark).observations_) {
+        if (shared[other.keyframe.value()]++ == 0) others.push_back(other.keyframe);
+      }
+    }
+    std::sort(others.begin(), others.end());
+    keyframe.covisible_.clear();
+    for (const KeyframeId other : others) {
+      if (other != keyframe.id()) keyframe.covisible_.push_back({other, shared[other.value()]});
+      shared[other.value()] = 0;
+    }
+  });
+}
+
 void Map::Unlink(KeyframeId keyframe_id, uint32_t keypoint) {
   Keyframe& keyframe = keyframes_.At(keyframe_id);
   const LandmarkId landmark_id = keyframe.landmarks_.at(keypoint);

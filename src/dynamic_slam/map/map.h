@@ -63,6 +63,11 @@ class Map {
   // The keypoint must be free, and the keyframe must not see the landmark already.
   void Link(KeyframeId keyframe, uint32_t keypoint, LandmarkId landmark);
 
+  // For a map that is put together at once: all links of a landmark that has none yet, in order of their
+  // keyframes. CountCovisibility() follows the last of them, before anything else is asked of the map.
+  void LinkAll(LandmarkId landmark, std::vector<Observation> observations);
+  void CountCovisibility();
+
   // Removes the keypoint's link, and the landmark with it when fewer than two observations are left.
   void Unlink(KeyframeId keyframe, uint32_t keypoint);
 

@@ -253,9 +253,7 @@ void TakeLandmark(double max_pairs, Reader* in, Map* map, double* pairs) {
   landmark.found_count = static_cast<int>(found);
   landmark.static_log_odds = static_log_odds;
   landmark.is_from_file = true;
-  for (const Observation& observation : observations) {
-    map->Link(observation.keyframe, observation.keypoint, landmark.id());
-  }
+  map->LinkAll(landmark.id(), std::move(observations));
   map->RefreshLandmark(landmark.id());
 }
 
@@ -286,6 +284,7 @@ SavedMap TakeMap(std::string_view payload) {
   for (uint32_t i = 0; i < landmarks; ++i) {
     TakeLandmark(kMaxCovisibilityShare * file_bytes, &in, &saved.map, &pairs);
   }
+  saved.map.CountCovisibility();
   DS_REFUSE_UNLESS(in.left() == 0, "{} bytes follow its end", in.left());
   return saved;
 }

@@ -167,12 +167,16 @@ void SlamSystem::CloseLoop(const MappedKeyframe& keyframe, const std::stop_token
   report->times_ms.push_back(MillisecondsSince(start));
 }
 
-BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
-  DS_TRACE("finish");
-  if (is_stopped_) return {};
+void SlamSystem::DrainMapping() {
   executor_->Drain(Lane::kMapping);
   PostLoops();
   executor_->Drain(Lane::kLoop);
+}
+
+BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
+  DS_TRACE("finish");
+  if (is_stopped_) return {};
+  DrainMapping();
   const bool adjusts = options_.final_bundle && !options_.tracker.localise_only;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) Backfill(should_stop);
@@ -196,8 +200,7 @@ void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
   }
 }
 
-void SlamSystem::LoadMap(SavedMap saved, const std::string& name) {
-  DS_CHECK(frame_count_ == 0, "frames={}", frame_count_);
+void SlamSystem::CheckMapFits(const SavedMap& saved, const std::string& name) const {
   if (!IsSameCamera(saved.camera, camera())) {
     throw InputError(name, fmt::format("was made with another camera ('{}')", saved.camera.name),
                      "Give the --camera and the options image.* of the run that saved it.");
@@ -206,6 +209,11 @@ void SlamSystem::LoadMap(SavedMap saved, const std::string& name) {
     throw InputError(name, "was made with other octaves",
                      "Give orb.levels and orb.scale_factor of the run that saved it.");
   }
+}
+
+void SlamSystem::LoadMap(SavedMap saved, const std::string& name) {
+  DS_CHECK(frame_count_ == 0, "frames={}", frame_count_);
+  CheckMapFits(saved, name);
   saved.map.landmarks().ForEach([](Landmark& landmark) {
     // Many sightings of an earlier visit say no more of this one than a few.
     constexpr int kMaxSightings = 10;
@@ -215,6 +223,15 @@ void SlamSystem::LoadMap(SavedMap saved, const std::string& name) {
   });
   map_.Write()->Replace(std::move(saved.map));
   tracker_.ExpectKnownPlace();
+}
+
+void SlamSystem::SetLocaliseOnly(bool localise_only) {
+  DrainMapping();
+  if (localise_only && map_.Read()->keyframes().size() == 0) {
+    throw InputError("localise_only", "there is no map to localise in", "Load one, or make one first.");
+  }
+  options_.tracker.localise_only = localise_only;
+  tracker_.SetLocaliseOnly(localise_only);
 }
 
 void SlamSystem::Stop() {

@@ -70,9 +70,15 @@ class SlamSystem {
   // called before the first image.
   void SetDetector(std::shared_ptr<Detector> detector);
 
-  // The camera is looked for in this map first. `name` is that of its file, for messages. To be called before
-  // the first image. Throws InputError when it was made with another camera or other octaves.
+  // Throws InputError when the map was made with another camera or other octaves. `name` is that of its file.
+  void CheckMapFits(const SavedMap& saved, const std::string& name) const;
+
+  // The camera is looked for in this map first. To be called before the first image. Throws as CheckMapFits.
   void LoadMap(SavedMap saved, const std::string& name);
+
+  // Only poses in the map, which stays as it is (true), or growth again (false), from the next image on.
+  // Waits for what mapping has begun. Throws InputError when there is no map to localise in.
+  void SetLocaliseOnly(bool localise_only);
 
   // image: of the raw camera's size, any type that ImagePreparer takes. mask: empty, or CV_8UC1 of camera()'s
   // size, not 0 where keypoints are forbidden, beside those of the static mask. Throws InputError, and
@@ -132,6 +138,7 @@ class SlamSystem {
   void Remember(const FrameResult& result);
   void Backfill(const std::function<bool()>& should_stop);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
+  void DrainMapping();  // and the search for loops
   // Looks for loops at the keyframes that local mapping has done since the last call.
   void PostLoops();
   void CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token);

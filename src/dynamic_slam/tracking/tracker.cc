@@ -135,6 +135,15 @@ void Tracker::AcceptPose() {
   if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
 }
 
+void Tracker::SetLocaliseOnly(bool localise_only) {
+  options_.localise_only = localise_only;
+  if (!localise_only) return;
+  start_is_certain_ = true;
+  start_is_young_ = false;
+  if (state_ == TrackingState::kInitialising) state_ = TrackingState::kLost;
+  initializer_.Reset();
+}
+
 void Tracker::Initialise(TrackingResult* result) {
   const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
   reason_ = initializer_.reason();

@@ -83,6 +83,9 @@ class Tracker {
   // The map was read from a file: the camera is somewhere in it, or somewhere else. Before the first image.
   void ExpectKnownPlace() { state_ = TrackingState::kLost; }
 
+  // TrackerOptions::localise_only from the next image on. With it, the map must have keyframes.
+  void SetLocaliseOnly(bool localise_only);
+
   // Forgets everything, and empties the map: the same images give the same poses again.
   void Reset();
 
