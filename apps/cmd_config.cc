@@ -12,13 +12,14 @@
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/camera_import.h"
 #include "dynamic_slam/system/system_options.h"
+#include "man_page.h"
 
 namespace dynamic_slam {
 namespace {
 
 // One of them is given.
 struct ConfigArguments {
-  bool defaults = false, markdown = false;
+  bool defaults = false, markdown = false, man = false;
   std::optional<std::string> explain, check, import_camera;
   std::vector<int> image_size;  // px; empty, or width and height
 };
@@ -73,11 +74,12 @@ void PrintImportedCamera(const std::string& file, const std::vector<int>& image_
   fmt::print("{}", CameraToYaml(ImportCamera(file, size)));
 }
 
-void RunConfig(const ConfigArguments& arguments) {
+void RunConfig(const ConfigArguments& arguments, const CLI::App& app) {
   if (arguments.defaults) PrintDefaults();
   if (arguments.explain) Explain(*arguments.explain);
   if (arguments.check) Check(*arguments.check);
   if (arguments.markdown) PrintMarkdown();
+  if (arguments.man) fmt::print("{}", ManPage(app));
   if (arguments.import_camera) PrintImportedCamera(*arguments.import_camera, arguments.image_size);
 }
 
@@ -96,6 +98,7 @@ void AddConfigCommand(CLI::App& app) {
   what->add_option("--check", a.check, "Find everything that is wrong with a YAML file of options")
       ->type_name("FILE");
   what->add_flag("--markdown", a.markdown, "Print the page docs/config.md");
+  what->add_flag("--man", a.man, "Print the manual page, for man");
   what->add_option("--import-camera", a.import_camera,
                    "Print the camera file for a calibration file of ORB-SLAM2, ORB-SLAM3, OpenVSLAM, "
                    "stella_vslam, Kalibr or EuRoC")
@@ -111,7 +114,7 @@ void AddConfigCommand(CLI::App& app) {
       "  dynamic_slam config --check my.yaml\n"
       "  dynamic_slam config --explain tracker.keyframe\n"
       "  dynamic_slam config --import-camera TUM1.yaml --image-size 640 480 > my_camera.yaml");
-  command->callback([arguments] { RunConfig(*arguments); });
+  command->callback([arguments, &app] { RunConfig(*arguments, app); });
 }
 
 }  // namespace dynamic_slam

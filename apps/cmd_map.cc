@@ -1,6 +1,5 @@
 #include "cmd_map.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -9,11 +8,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "dynamic_slam/api/map_contents.h"
 #include "dynamic_slam/base/error.h"
-#include "dynamic_slam/io/colmap_model.h"
-#include "dynamic_slam/io/point_cloud_file.h"
-#include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/map/map_file.h"
+#include "dynamic_slam/map_view.h"
 
 namespace dynamic_slam {
 namespace {
@@ -22,34 +20,6 @@ struct MapArguments {
   std::string file, out;
   int part = 0;
 };
-
-struct PartContents {
-  PartId id;
-  std::vector<const Keyframe*> keyframes;  // by stamp
-  std::vector<const Landmark*> landmarks;
-};
-
-// The parts of the map, the one with the most keyframes first.
-std::vector<PartContents> ContentsOf(const Map& map) {
-  std::vector<PartContents> parts;
-  for (const PartId id : map.Parts()) {
-    PartContents part{id, {}, {}};
-    map.keyframes().ForEach([&](const Keyframe& keyframe) {
-      if (keyframe.part() == id) part.keyframes.push_back(&keyframe);
-    });
-    map.landmarks().ForEach([&](const Landmark& landmark) {
-      if (map.PartOf(landmark) == id) part.landmarks.push_back(&landmark);
-    });
-    std::stable_sort(part.keyframes.begin(), part.keyframes.end(), [](const Keyframe* a, const Keyframe* b) {
-      return a->timestamp_s() < b->timestamp_s();
-    });
-    parts.push_back(std::move(part));
-  }
-  std::stable_sort(parts.begin(), parts.end(), [](const PartContents& a, const PartContents& b) {
-    return a.keyframes.size() > b.keyframes.size();
-  });
-  return parts;
-}
 
 void PrintInfo(const MapArguments& arguments) {
   const SavedMap saved = ReadMapFile(arguments.file);
@@ -61,11 +31,11 @@ void PrintInfo(const MapArguments& arguments) {
              camera.fy, camera.cx, camera.cy);
   fmt::print("octaves    {}\n", saved.map.octave_scales().size());
   fmt::print("keyframes  {}\nlandmarks  {}\n", saved.map.keyframes().size(), saved.map.landmarks().size());
-  const std::vector<PartContents> parts = ContentsOf(saved.map);
-  for (size_t i = 0; i < parts.size(); ++i) {
-    fmt::print("part {}     {} keyframes from {:.6f} to {:.6f} s, {} landmarks\n", i + 1,
-               parts[i].keyframes.size(), parts[i].keyframes.front()->timestamp_s(),
-               parts[i].keyframes.back()->timestamp_s(), parts[i].landmarks.size());
+  int number = 0;
+  for (const MapView::Part& part : ContentsOf(camera, saved.map).parts) {
+    fmt::print("part {}     {} keyframes from {:.6f} to {:.6f} s, {} landmarks\n", ++number,
+               part.keyframes.size(), part.keyframes.front().timestamp_s, part.keyframes.back().timestamp_s,
+               part.landmarks.size());
   }
 }
 
@@ -79,26 +49,9 @@ void Validate(const MapArguments& arguments) {
 }
 
 void Export(const MapArguments& arguments) {
-  const SavedMap saved = ReadMapFile(arguments.file);
-  const std::vector<PartContents> parts = ContentsOf(saved.map);
-  if (static_cast<size_t>(arguments.part) > parts.size()) {
-    throw InputError(arguments.file,
-                     fmt::format("has {} parts, and no part {}", parts.size(), arguments.part),
-                     "See `dynamic_slam map info`.");
-  }
-  const PartContents& part = parts[static_cast<size_t>(arguments.part - 1)];
-  const std::filesystem::path out(arguments.out);
-  std::vector<Eigen::Vector3f> points;
-  for (const Landmark* landmark : part.landmarks) points.push_back(landmark->position().cast<float>());
-  WritePly(out / "map.ply", points);
-  Trajectory keyframes;
-  for (const Keyframe* keyframe : part.keyframes) {
-    keyframes.push_back({keyframe->timestamp_s(), keyframe->cam_from_world().Inverse()});
-  }
-  WriteTumTrajectory(out / "keyframes.txt", keyframes);
-  WriteColmapModel(out / "colmap", saved.camera, saved.map, part.id);
+  const MapView::Part part = ExportMap(arguments.file, arguments.out, arguments.part);
   fmt::print("{} keyframes and {} landmarks: {}/map.ply, keyframes.txt and colmap\n", part.keyframes.size(),
-             part.landmarks.size(), out.string());
+             part.landmarks.size(), arguments.out);
 }
 
 }  // namespace

@@ -14,10 +14,12 @@
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/eval/scale_source.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/fault_injection.h"
 #include "dynamic_slam/io/frame_source.h"
+#include "dynamic_slam/io/live_source.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/system/run_journal.h"
@@ -40,10 +42,11 @@ struct RunArguments {
   std::string config;
   std::vector<std::string> assignments;
   std::string detector = "none";
-  std::string mode = "offline";
+  std::string mode;
   std::string out;
   std::string trace;
   std::string truth;
+  std::string scale_from;
   std::string models;
   std::string overlay, masks, export_masks;
   std::string save_map, load_map;
@@ -58,6 +61,7 @@ struct RunArguments {
 
 std::filesystem::path OutputFolder(const RunArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
+  if (IsLiveSource(arguments.source)) return "out/live";
   std::filesystem::path source = std::filesystem::absolute(arguments.source).lexically_normal();
   if (source.filename().empty()) source = source.parent_path();
   if (!std::filesystem::is_directory(source)) return std::filesystem::path("out") / source.stem();
@@ -116,6 +120,30 @@ class Checkpoint {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+// How long the unit of the main part of the map is; a reason is said where that cannot be told.
+std::optional<MetricScale> FindScale(const ScaleSource& source, const RunArguments& arguments,
+                                     const SlamSystem& system) {
+  const Trajectory trajectory = system.FrameTrajectory();
+  try {
+    if (trajectory.empty()) throw InputError("--scale-from", "there is no map", "");
+    MetricScale scale;
+    if (const auto* distance = std::get_if<KnownDistance>(&source)) {
+      scale = ScaleFromDistance(trajectory, *distance);
+    } else if (const auto* height = std::get_if<KnownHeight>(&source)) {
+      scale = ScaleFromHeight(*system.map().Read(), system.Parts().front(), *height, system.options().seed);
+    } else {
+      const std::filesystem::path& file = std::get<KnownTrajectory>(source).file;
+      scale = ScaleFromTrajectory(trajectory, ReadGroundTruth(file, arguments.source), file.string());
+    }
+    fmt::print("scale: {:.4f} m a unit, +- {:.1f} % ({}); results are in metres\n", scale.metres_per_unit,
+               100 * scale.relative_error, scale.from);
+    return scale;
+  } catch (const InputError& error) {
+    fmt::print("no scale, results are in units of the map: {}\n", error.what());
+    return std::nullopt;
+  }
+}
+
 void RunSource(const RunArguments& arguments, int* exit_code) {
   TraceThreadName("main");
   if (!arguments.trace.empty()) StartTrace();
@@ -126,8 +154,14 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   options.tracker.localise_only |= arguments.localise_only;
   options.backfill &= !arguments.no_backfill;
   CheckMapOptions(arguments, options);
+  std::optional<ScaleSource> scale_source;
+  if (!arguments.scale_from.empty()) scale_source = ParseScaleSource(arguments.scale_from);
   const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
-  std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
+  RunConsole console(arguments.quiet);
+  FrameSourceOptions source_options = arguments.source_options;
+  source_options.on_event = [&console](const std::string& event) { console.Say(event); };
+  source_options.should_stop = [&console] { return console.ShouldStop(); };
+  std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, source_options);
   if (!arguments.faults.empty()) {
     source = InjectFaults(std::move(source), ParseFaults(arguments.faults, "--inject"));
   }
@@ -135,7 +169,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::filesystem::path out = OutputFolder(arguments);
   std::optional<Trajectory> truth;
   if (!arguments.truth.empty()) truth = ReadGroundTruth(arguments.truth, arguments.source);
-  SlamSystem system(camera, options, arguments.mode == "realtime" ? RunMode::kRealtime : RunMode::kOffline);
+  const bool is_realtime = arguments.mode.empty() ? source->IsLive() : arguments.mode == "realtime";
+  SlamSystem system(camera, options, is_realtime ? RunMode::kRealtime : RunMode::kOffline);
   RunRecorder recorder(arguments.source, camera, options.image);
   system.SetDetector(recorder.Record(detector));
   if (!arguments.load_map.empty()) system.LoadMap(ReadMapFile(arguments.load_map), arguments.load_map);
@@ -145,7 +180,6 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   PrepareOutputFolder(out);
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   if (!arguments.save_map.empty()) CheckCanBeWritten(arguments.save_map);
-  RunConsole console(arguments.quiet);
   RunControl control = console.Control();
   std::optional<MaskFolder> masks;
   if (!arguments.masks.empty()) {
@@ -183,6 +217,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   console.End();
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
+  if (scale_source.has_value()) summary.scale = FindScale(*scale_source, arguments, system);
   WriteResults(out, system, summary);
   journal.Remove();
   if (!arguments.save_map.empty() && summary.failure == nullptr) {
@@ -209,7 +244,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
   RunArguments& a = *arguments;
   command
       ->add_option("SOURCE", a.source,
-                   "Folder in TUM RGB-D, KITTI odometry or EuRoC layout, folder of images, or video file")
+                   "Folder in TUM RGB-D, KITTI odometry or EuRoC layout, folder of images, video file, "
+                   "camera:0, or rtsp://...")
       ->required();
   command->add_option("--camera", a.camera,
                       "Name of a known camera, or camera file (default: what SOURCE says)");
@@ -233,9 +269,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
   command
       ->add_option("--mode", a.mode,
                    "offline: every frame, reproducible. realtime: at the pace of the time stamps; "
-                   "frames that come too fast are dropped")
-      ->check(CLI::IsMember({"offline", "realtime"}))
-      ->capture_default_str();
+                   "frames that come too fast are dropped (default: realtime of a camera, else offline)")
+      ->check(CLI::IsMember({"offline", "realtime"}));
   command->add_option("--out", a.out, "Folder for the results (default: out/ and the name of SOURCE)");
   command->add_option("--save-map", a.save_map, "File for the map, for later runs and `dynamic_slam map`");
   command
@@ -252,6 +287,12 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                       "File for the times of all stages (Chrome trace, for ui.perfetto.dev)");
   command->add_option("--truth", a.truth,
                       "Ground truth, in TUM's or KITTI's format (default: that beside the images)");
+  command
+      ->add_option(
+          "--scale-from", a.scale_from,
+          "Results in metres: distance:A,B,METRES between two times, s; camera-height:METRES above the "
+          "ground; file:TRAJECTORY in metres")
+      ->type_name("WHAT");
   AddViewerOptions(command, &a.viewer);
   AddSourceOptions(command, &a.source_options);
   command->add_option(
@@ -263,7 +304,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       "Examples:\n"
       "  dynamic_slam run rgbd_dataset_freiburg1_desk --camera tum_fr1\n"
       "  dynamic_slam run kitti/sequences/00 --out out/kitti_00 --set orb.features=2000\n"
-      "  dynamic_slam run video.mp4 --camera my_camera.yaml");
+      "  dynamic_slam run video.mp4 --camera my_camera.yaml\n"
+      "  dynamic_slam run camera:0 --camera my_camera.yaml --viewer");
   command->callback([arguments, exit_code] { RunSource(*arguments, exit_code); });
 }
 

@@ -6,9 +6,11 @@
 #include <fmt/core.h>
 
 #include "cmd_bench.h"
+#include "cmd_calibrate.h"
 #include "cmd_config.h"
 #include "cmd_demo.h"
 #include "cmd_detect.h"
+#include "cmd_doctor.h"
 #include "cmd_eval.h"
 #include "cmd_map.h"
 #include "cmd_models.h"
@@ -38,6 +40,8 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddEvalCommand(app);
   dynamic_slam::AddDetectCommand(app, &exit_code);
   dynamic_slam::AddMapCommand(app);
+  dynamic_slam::AddCalibrateCommand(app);
+  dynamic_slam::AddDoctorCommand(app);
   dynamic_slam::AddModelsCommand(app);
   dynamic_slam::AddSimulateCommand(app);
   dynamic_slam::AddDemoCommand(app, &exit_code);

@@ -41,6 +41,10 @@ RunConsole::~RunConsole() {
 
 bool RunConsole::ShouldStop() const { return interrupted; }
 
+void RunConsole::Say(const std::string& text) const {
+  fmt::print(stderr, "{}{}\n", overwrite_ ? "\r\033[K" : "", text);
+}
+
 void RunConsole::Show(const RunProgress& progress) {
   if (quiet_) return;
   const TrackingResult& tracking = progress.result->tracking;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 
 #include "dynamic_slam/system/sequence_runner.h"
 
@@ -18,6 +19,9 @@ class RunConsole {
   RunConsole& operator=(const RunConsole&) = delete;
 
   void Show(const RunProgress& progress);
+
+  // A line that stays; from any thread.
+  void Say(const std::string& text) const;
 
   // There was an interrupt.
   bool ShouldStop() const;

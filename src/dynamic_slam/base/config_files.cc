@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <system_error>
 
+#include <dlfcn.h>
+
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/text.h"
 
@@ -12,16 +14,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// The file of this code: the program, or libdynamic_slam.so in another one.
+fs::path OwnFile() {
+  Dl_info info{};
+  std::error_code error;
+  if (dladdr(reinterpret_cast<const void*>(&OwnFile), &info) != 0 && info.dli_fname != nullptr) {
+    // A program is named as it was called there, which need not be a path.
+    const fs::path file = info.dli_fname;
+    if (file.is_absolute()) return fs::weakly_canonical(file, error);
+  }
+  return fs::read_symlink("/proc/self/exe", error);
+}
+
 // Best first.
 std::vector<fs::path> Folders(const std::string& kind) {
   std::vector<fs::path> folders;
   if (const char* config = std::getenv("DYNAMIC_SLAM_CONFIG"); config != nullptr && *config != '\0') {
     folders.push_back(fs::path(config) / kind);
   }
+  // Above bin, lib or lib/x86_64-linux-gnu.
+  const fs::path own_folder = OwnFile().parent_path();
+  for (const fs::path& prefix : {own_folder.parent_path(), own_folder.parent_path().parent_path()}) {
+    folders.push_back(prefix / "share/dynamic_slam/config" / kind);
+  }
   folders.push_back(fs::path(DYNAMIC_SLAM_SOURCE_CONFIG) / kind);
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) folders.push_back(program.parent_path().parent_path() / "share/dynamic_slam/config" / kind);
   return folders;
 }
 

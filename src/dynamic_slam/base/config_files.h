@@ -8,8 +8,8 @@
 namespace dynamic_slam {
 
 // Files that come with the program, such as cameras and detectors: NAME.yaml in the folder of their kind
-// ("cameras", "detectors") in the first of $DYNAMIC_SLAM_CONFIG, the config of the source tree and of the
-// installation.
+// ("cameras", "detectors") in the first of $DYNAMIC_SLAM_CONFIG, the config of the installation that the
+// program or libdynamic_slam.so is in, and that of the source tree.
 
 // The names of all files of the kind, sorted.
 std::vector<std::string> ConfigNames(const std::string& kind);

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamic_slam/base/export.h"
 #include "dynamic_slam/eval/pose_list.h"
 #include "dynamic_slam/geometry/sim3.h"
 
@@ -48,20 +49,22 @@ struct TrajectoryErrors {
 // For each pose of the shorter list (the estimate, when they are equally long) the pose of the longer one
 // that is nearest in time, if it is within max_dt_s. A pose of the longer list may be taken twice. Both
 // ordered by time. Throws InputError when nothing matches.
-MatchedPoses MatchByTime(const PoseList& reference, const PoseList& estimate, double max_dt_s);
+DYNAMIC_SLAM_API MatchedPoses MatchByTime(const PoseList& reference, const PoseList& estimate,
+                                          double max_dt_s);
 
 // Row by row. Throws InputError when the lengths differ.
-MatchedPoses MatchByRow(const PoseList& reference, const PoseList& estimate);
+DYNAMIC_SLAM_API MatchedPoses MatchByRow(const PoseList& reference, const PoseList& estimate);
 
 // Absolute pose error: each estimated pose against its reference, after the alignment of all positions.
 // Throws InputError when the alignment is not determined (fewer than 3 positions, or all on one line).
-TrajectoryErrors AbsolutePoseError(const MatchedPoses& poses, Alignment alignment);
+DYNAMIC_SLAM_API TrajectoryErrors AbsolutePoseError(const MatchedPoses& poses, Alignment alignment);
 
 // Relative pose error: after the alignment, motions of the estimate against those of the reference, between
 // poses i, j with j - i = delta frames, or with delta metres along the *estimate* between them, one pair
 // beginning where the last one ended. As in evo, the first pair by metres begins only after delta metres.
 // Throws InputError as above, and when there is no such pair.
-TrajectoryErrors RelativePoseError(const MatchedPoses& poses, Alignment alignment, const RpeOptions& options);
+DYNAMIC_SLAM_API TrajectoryErrors RelativePoseError(const MatchedPoses& poses, Alignment alignment,
+                                                    const RpeOptions& options);
 
 // Empty `errors` give zeros.
 ErrorStatistics Summarise(std::vector<double> errors);

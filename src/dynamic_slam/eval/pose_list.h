@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "dynamic_slam/base/export.h"
 #include "dynamic_slam/geometry/trajectory.h"
 
 namespace dynamic_slam {
@@ -19,15 +20,15 @@ struct EvalPose {
 
 using PoseList = std::vector<EvalPose>;
 
-PoseList ToPoseList(const Trajectory& trajectory);
+DYNAMIC_SLAM_API PoseList ToPoseList(const Trajectory& trajectory);
 
 // m, from position to position.
-double PathLength(const PoseList& poses);
+DYNAMIC_SLAM_API double PathLength(const PoseList& poses);
 
 // From the upper 3x4 parts of world_from_cam, as KITTI's files have them. `times_s` holds a stamp for each;
 // when it is empty, the stamps are the row numbers. Throws InputError when there are more or fewer stamps
 // than poses.
-PoseList ToPoseList(std::span<const Eigen::Matrix<double, 3, 4>> world_from_cam,
-                    std::span<const double> times_s);
+DYNAMIC_SLAM_API PoseList ToPoseList(std::span<const Eigen::Matrix<double, 3, 4>> world_from_cam,
+                                     std::span<const double> times_s);
 
 }  // namespace dynamic_slam

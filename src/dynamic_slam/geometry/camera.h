@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "dynamic_slam/base/export.h"
+
 namespace dynamic_slam {
 
 // How a lens departs from a pinhole.
@@ -24,7 +26,7 @@ enum class LensModel {
 //
 // The SLAM works in *ideal* pixels: what a distortion-free pinhole with the same fx, fy, cx, cy would see.
 // Keypoints are undistorted once, at extraction. Pixel (0, 0) is the centre of the top left pixel.
-struct Camera {
+struct DYNAMIC_SLAM_API Camera {
   // Rays of a fisheye farther from the optical axis are not used: in the ideal image the noise of a pixel
   // grows along the radius with 1 / cos^2, 4 times at 60 deg.
   static constexpr double kMaxIncidenceRad = std::numbers::pi / 3;

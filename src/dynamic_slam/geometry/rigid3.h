@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "dynamic_slam/base/export.h"
+
 namespace dynamic_slam {
 
 inline Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
@@ -12,10 +14,10 @@ inline Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
 }
 
 // Rotation vector (rad) to unit quaternion.
-Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& rotation_vector);
+DYNAMIC_SLAM_API Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& rotation_vector);
 
 // Unit quaternion to rotation vector (rad) of length at most pi.
-Eigen::Vector3d LogSo3(const Eigen::Quaterniond& rotation);
+DYNAMIC_SLAM_API Eigen::Vector3d LogSo3(const Eigen::Quaterniond& rotation);
 
 // A rigid transform: x_in_target = rotation * x_in_source + translation. Name it target_from_source.
 struct Rigid3 {
@@ -51,6 +53,6 @@ struct Rigid3 {
 };
 
 // Angle between two rotations, rad, in [0, pi].
-double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
+DYNAMIC_SLAM_API double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
 }  // namespace dynamic_slam

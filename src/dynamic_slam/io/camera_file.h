@@ -6,6 +6,7 @@
 
 #include <opencv2/core/types.hpp>
 
+#include "dynamic_slam/base/export.h"
 #include "dynamic_slam/geometry/camera.h"
 
 namespace dynamic_slam {
@@ -13,18 +14,18 @@ namespace dynamic_slam {
 // Reads a camera file (YAML): model, width, height, fx, fy, cx, cy, and optionally name and fps. The model is
 // pinhole, with k1, k2, p1, p2, k3 where the lens distorts, or kannala_brandt, with k1, k2, k3, k4. The
 // camera is validated. Throws InputError with file:line for each problem.
-Camera ReadCamera(const std::filesystem::path& file);
+DYNAMIC_SLAM_API Camera ReadCamera(const std::filesystem::path& file);
 
 // `name_or_path` is a camera file, or the name of one of config/cameras (base/config_files.h). An InputError
 // for an unknown name lists the known ones.
-Camera LoadCamera(const std::string& name_or_path);
+DYNAMIC_SLAM_API Camera LoadCamera(const std::string& name_or_path);
 
 // The names that LoadCamera knows, sorted.
-std::vector<std::string> KnownCameras();
+DYNAMIC_SLAM_API std::vector<std::string> KnownCameras();
 
 // As ReadCamera reads it.
-std::string CameraToYaml(const Camera& camera);
-void WriteCamera(const std::filesystem::path& file, const Camera& camera);
+DYNAMIC_SLAM_API std::string CameraToYaml(const Camera& camera);
+DYNAMIC_SLAM_API void WriteCamera(const std::filesystem::path& file, const Camera& camera);
 
 // Throws InputError when images of this size cannot be from that camera. origin: where the camera is from,
 // for the message.

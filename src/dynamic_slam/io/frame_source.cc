@@ -14,6 +14,7 @@
 #include "dynamic_slam/io/camera_import.h"
 #include "dynamic_slam/io/checked_source.h"
 #include "dynamic_slam/io/image_file.h"
+#include "dynamic_slam/io/live_source.h"
 #include "dynamic_slam/io/source_layout.h"
 
 namespace dynamic_slam {
@@ -152,6 +153,7 @@ std::unique_ptr<FrameSource> OpenFrameSource(const fs::path& path, const FrameSo
                                  options.start, options.max_frames),
                      "Leave out what is not needed.");
   }
+  if (IsLiveSource(path.string())) return OpenLiveSource(path.string(), options);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw InputError(path.string(), "there is no such file or folder", "Check the path.");

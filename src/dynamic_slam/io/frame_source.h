@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "dynamic_slam/base/export.h"
 #include "dynamic_slam/geometry/camera.h"
 
 namespace dynamic_slam {
@@ -25,7 +27,7 @@ struct SourceProblem {
 };
 
 // A sequence of images with time stamps, read one after the other.
-class FrameSource {
+class DYNAMIC_SLAM_API FrameSource {
  public:
   virtual ~FrameSource() = default;
 
@@ -37,8 +39,11 @@ class FrameSource {
   // Frames in all that Next() will try, after start and max_frames, with those it will skip; 0 when unknown.
   virtual size_t FrameCount() const = 0;
 
-  // "tum", "kitti", "euroc", "images", "video".
+  // "tum", "kitti", "euroc", "images", "video", "live".
   virtual std::string Layout() const = 0;
+
+  // Whether images come by themselves at their time, and are gone when nobody takes them.
+  virtual bool IsLive() const { return false; }
 
   // The camera that the source itself describes (camera.yaml, else KITTI's calib.txt or EuRoC's sensor.yaml),
   // if any. Throws InputError when that file is wrong.
@@ -56,13 +61,18 @@ struct FrameSourceOptions {
   int start = 0;          // frames skipped at the beginning, without decoding them
   int max_frames = 0;     // frames tried after that; 0: all
   bool any_size = false;  // images of another size than the first are not skipped
+
+  // Of a camera or a stream: what the user should hear at once, such as that it is gone and looked for again,
+  // and whether to give that up.
+  std::function<void(const std::string&)> on_event{};
+  std::function<bool()> should_stop{};
 };
 
 // Opens a folder in TUM RGB-D (rgb.txt), KITTI odometry (image_0, times.txt) or EuRoC layout (mav0, or the
-// folder above it, or cam0), a folder of images (in natural order) or a video file. Throws InputError with
-// the reason and the remedy when there is no such thing, its layout is not known or no image of it can be
-// read.
-std::unique_ptr<FrameSource> OpenFrameSource(const std::filesystem::path& path,
-                                             const FrameSourceOptions& options = {});
+// folder above it, or cam0), a folder of images (in natural order), a video file, a camera ("camera:0") or a
+// stream ("rtsp://..."). Throws InputError with the reason and the remedy when there is no such thing, its
+// layout is not known or no image of it can be read.
+DYNAMIC_SLAM_API std::unique_ptr<FrameSource> OpenFrameSource(const std::filesystem::path& path,
+                                                              const FrameSourceOptions& options = {});
 
 }  // namespace dynamic_slam

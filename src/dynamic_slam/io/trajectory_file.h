@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "dynamic_slam/base/export.h"
 #include "dynamic_slam/geometry/trajectory.h"
 
 namespace dynamic_slam {
@@ -16,8 +17,9 @@ namespace dynamic_slam {
 
 // TUM format: "timestamp tx ty tz qx qy qz qw" (s, m, unit quaternion), comments with #. The quaternion's
 // norm may differ from 1 by 0.01, as rounded files do, and is corrected. Stamps must not go back.
-Trajectory ReadTumTrajectory(const std::filesystem::path& file);
-void WriteTumTrajectory(const std::filesystem::path& file, std::span<const StampedPose> trajectory);
+DYNAMIC_SLAM_API Trajectory ReadTumTrajectory(const std::filesystem::path& file);
+DYNAMIC_SLAM_API void WriteTumTrajectory(const std::filesystem::path& file,
+                                         std::span<const StampedPose> trajectory);
 
 // Three rows of a transform world_from_cam as the file has them, so that an evaluator sees the same numbers
 // as others: the rotation of a rounded file is orthonormal to some 1e-6 only.
@@ -39,6 +41,7 @@ std::optional<Trajectory> LoadGroundTruth(const std::filesystem::path& source);
 
 // Ground truth in any file: TUM format, or KITTI's with the stamps of times.txt in the source's folder.
 // Throws InputError.
-Trajectory ReadGroundTruth(const std::filesystem::path& file, const std::filesystem::path& source);
+DYNAMIC_SLAM_API Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                                            const std::filesystem::path& source);
 
 }  // namespace dynamic_slam

@@ -10,7 +10,6 @@ namespace dynamic_slam {
 
 DynamicScore::DynamicScore(const DynamicScoreOptions& options, std::vector<double> class_scores)
     : options_(options), class_scores_(std::move(class_scores)) {
-  DS_CHECK(!class_scores_.empty());
   for (const double score : class_scores_) {
     DS_CHECK(score >= 0 && score <= DynamicPrior::kMaxScore, "score={}", score);
   }

@@ -58,7 +58,7 @@ struct DynamicBox : CompensatedBox {
 // become furniture. How long an unseen object goes on is the compensation's decision.
 class DynamicScore {
  public:
-  // class_scores: 0 to 10, by class id (dynamic_prior.h); not empty.
+  // class_scores: 0 to 10, by class id (dynamic_prior.h); none: there are no boxes.
   DynamicScore(const DynamicScoreOptions& options, std::vector<double> class_scores);
 
   // The boxes of the next frame as the compensation has them; each in turn with its score. A detection counts

@@ -61,7 +61,7 @@ class RealtimeFeed : public FrameFeed {
         due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause_s));
       }
       last_stamp_s = image->timestamp_s;
-      WaitUntil(due, token);
+      if (!source_->IsLive()) WaitUntil(due, token);
       dropped_ += images_.Push(std::move(*image)).has_value();
     }
   }

@@ -80,6 +80,11 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                           {"iterations", summary.final_bundle.iterations},
                           {"initial_cost", summary.final_bundle.initial_cost},
                           {"final_cost", summary.final_bundle.final_cost}};
+  if (summary.scale.has_value()) {
+    json["scale"] = {{"metres_per_unit", summary.scale->metres_per_unit},
+                     {"relative_error", summary.scale->relative_error},
+                     {"from", summary.scale->from}};
+  }
   json["mode"] = Name(summary.mode);
   json["seed"] = summary.seed;
   json["version"] = DYNAMIC_SLAM_VERSION;
@@ -107,13 +112,19 @@ std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
   return csv;
 }
 
-std::vector<Eigen::Vector3f> LandmarksOfMainPart(const SlamSystem& system) {
+Trajectory Scaled(Trajectory trajectory, double factor) {
+  for (StampedPose& pose : trajectory) pose.world_from_cam.translation *= factor;
+  return trajectory;
+}
+
+std::vector<Eigen::Vector3f> LandmarksOfMainPart(const SlamSystem& system, double factor) {
   std::vector<Eigen::Vector3f> points;
   const std::vector<PartId> parts = system.Parts();
   if (parts.empty()) return points;
   const auto map = system.map().Read();
   map->landmarks().ForEach([&](const Landmark& landmark) {
-    if (map->PartOf(landmark) == parts.front()) points.push_back(landmark.position().cast<float>());
+    if (map->PartOf(landmark) != parts.front()) return;
+    points.push_back((factor * landmark.position()).cast<float>());
   });
   return points;
 }
@@ -179,11 +190,14 @@ void PrepareOutputFolder(const std::filesystem::path& folder) {
 
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary) {
   PrepareOutputFolder(folder);
-  const Trajectory trajectory = system.FrameTrajectory();
+  const double factor = summary.scale.has_value() ? summary.scale->metres_per_unit : 1;  // of the main part
+  const Trajectory trajectory = Scaled(system.FrameTrajectory(), factor);
   std::vector<Trajectory> trajectories;
-  for (const PartId part : system.Parts()) trajectories.push_back(system.FrameTrajectory(part));
+  for (const PartId part : system.Parts()) {
+    trajectories.push_back(trajectories.empty() ? trajectory : system.FrameTrajectory(part));
+  }
   WriteTrajectories(folder, trajectories);
-  WriteTumTrajectory(folder / "keyframes.txt", system.KeyframeTrajectory());
+  WriteTumTrajectory(folder / "keyframes.txt", Scaled(system.KeyframeTrajectory(), factor));
   const std::filesystem::path kitti = folder / "trajectory_kitti.txt";
   std::error_code ignored;
   std::filesystem::remove(kitti, ignored);
@@ -196,7 +210,7 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
   for (const RunSummary::FrameRecord& frame : summary.frames) frames += FramesCsvRow(frame);
   WriteFileAtomically(folder / "frames.csv", frames);
   WriteFileAtomically(folder / "loops.csv", LoopsCsv(summary.loops.attempts));
-  WritePly(folder / "map.ply", LandmarksOfMainPart(system));
+  WritePly(folder / "map.ply", LandmarksOfMainPart(system, factor));
   WriteFileAtomically(folder / "config.yaml", OptionsToYaml(system.options()));
   WriteFileAtomically(
       folder / "summary.json",

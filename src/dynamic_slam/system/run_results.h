@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamic_slam/geometry/metric_scale.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/slam_system.h"
 
@@ -45,6 +46,7 @@ struct RunSummary {
   double startup_s = 0;  // from the start of the process to the first frame
   double wall_s = 0;     // from the first frame to the final map
   double peak_rss_mb = 0;
+  std::optional<MetricScale> scale;  // of the main part of the map, if anything says how long its unit is
   bool interrupted = false;
   std::exception_ptr failure;          // what ended the run early, if anything was thrown
   std::string last_reason;             // what tracking said last, while it had no pose
@@ -75,7 +77,8 @@ std::string FailureMessage(const RunSummary& summary);
 
 // Writes trajectory.txt, trajectory_2.txt and so on for further parts of the map, keyframes.txt, frames.csv,
 // loops.csv, map.ply, config.yaml, summary.json and, for a KITTI source in which every frame has a pose,
-// trajectory_kitti.txt into the folder, which is made. Throws InputError when that is not possible.
+// trajectory_kitti.txt into the folder, which is made. With a scale, what is of the main part is in metres.
+// Throws InputError when that is not possible.
 void WriteResults(const std::filesystem::path& folder, const SlamSystem& system, const RunSummary& summary);
 
 // trajectory.txt, and trajectory_2.txt and so on; those of an earlier run in the folder go. Throws

@@ -17,18 +17,12 @@
 #include "dynamic_slam/mapping/local_mapper.h"
 #include "dynamic_slam/system/detection_stage.h"
 #include "dynamic_slam/system/executor.h"
+#include "dynamic_slam/system/run_mode.h"
 #include "dynamic_slam/system/system_options.h"
 #include "dynamic_slam/tracking/backfiller.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
-
-enum class RunMode {
-  kOffline,   // one thread, one fixed order of the stages: the same input gives the same bytes
-  kRealtime,  // the stages beside tracking in threads of their own
-};
-
-const char* Name(RunMode mode);
 
 // What became of one image, and how long it took.
 struct FrameResult {

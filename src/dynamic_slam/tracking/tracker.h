@@ -18,16 +18,9 @@
 #include "dynamic_slam/tracking/keyframe_policy.h"
 #include "dynamic_slam/tracking/map_localiser.h"
 #include "dynamic_slam/tracking/tracker_options.h"
+#include "dynamic_slam/tracking/tracking_state.h"
 
 namespace dynamic_slam {
-
-enum class TrackingState {
-  kInitialising,  // there is no map yet, or the camera was lost for long: a start is looked for
-  kTracking,
-  kLost,  // there is a map, and no pose in it
-};
-
-const char* Name(TrackingState state);
 
 // What became of one image.
 struct TrackingResult {

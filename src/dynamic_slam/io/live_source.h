@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <opencv2/core/mat.hpp>
+
+#include "dynamic_slam/io/frame_source.h"
+
+namespace dynamic_slam {
+
+// "camera:0", the number of a video device, or a stream: "rtsp://...", "http://...".
+bool IsLiveSource(const std::string& name);
+
+// Something that gives images for as long as it is there.
+class ImageGrabber {
+ public:
+  virtual ~ImageGrabber() = default;
+  virtual bool Open() = 0;                // anew, when it was open
+  virtual bool Grab(cv::Mat* image) = 0;  // waits for the next image; false: it is gone
+};
+
+// Time, for tests: seconds, and to wait for some.
+struct LiveClock {
+  std::function<double()> now_s;
+  std::function<void(double)> wait_s;
+};
+
+// Images with the time at which they came, s since the first. A grabber that is gone is opened again and
+// again, for a minute; then the source ends. Throws InputError when it cannot be opened at first.
+std::unique_ptr<FrameSource> MakeLiveSource(const std::string& name, std::unique_ptr<ImageGrabber> grabber,
+                                            const FrameSourceOptions& options, LiveClock clock);
+
+// By OpenCV: V4L2 for cameras, FFmpeg for streams.
+std::unique_ptr<FrameSource> OpenLiveSource(const std::string& name, const FrameSourceOptions& options);
+
+}  // namespace dynamic_slam

@@ -1,0 +1,120 @@
+#include "dynamic_slam/io/live_source.h"
+
+#include <deque>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/base/error.h"
+
+namespace dynamic_slam {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// A camera whose fate is written down: an image, or gone until it was opened so often.
+class FakeCamera : public ImageGrabber {
+ public:
+  // images[i]: how many images it gives after it was opened the i-th time; -1: it cannot be opened then, as
+  // after the last.
+  explicit FakeCamera(std::deque<int> images) : fate_(std::move(images)) {}
+
+  bool Open() override {
+    left_ = fate_.empty() ? -1 : fate_.front();
+    if (!fate_.empty()) fate_.pop_front();
+    return left_ >= 0;
+  }
+  bool Grab(cv::Mat* image) override {
+    if (left_-- <= 0) return false;
+    *image = cv::Mat::zeros(4, 6, CV_8UC1);
+    return true;
+  }
+
+ private:
+  std::deque<int> fate_;
+  int left_ = 0;
+};
+
+class LiveSourceTest : public ::testing::Test {
+ protected:
+  // An image every 0.1 s.
+  std::unique_ptr<FrameSource> Open(std::deque<int> images, FrameSourceOptions options = {}) {
+    options.on_event = [this](const std::string& event) { events_.push_back(event); };
+    const LiveClock clock{[this] { return now_s_ += 0.1; }, [this](double s) { now_s_ += s; }};
+    return MakeLiveSource("camera:7", std::make_unique<FakeCamera>(std::move(images)), options, clock);
+  }
+
+  static std::vector<double> Stamps(FrameSource* source) {
+    std::vector<double> stamps;
+    while (const std::optional<SourceImage> image = source->Next()) stamps.push_back(image->timestamp_s);
+    return stamps;
+  }
+
+  double now_s_ = 1000;
+  std::vector<std::string> events_;
+};
+
+TEST_F(LiveSourceTest, ComesBackAfterItWasGoneAndSaysSo) {
+  const auto source = Open({2, -1, -1, 3});
+  EXPECT_EQ(source->Layout(), "live");
+  EXPECT_TRUE(source->IsLive());
+  EXPECT_EQ(source->ImageSize(), cv::Size(6, 4));
+  const std::vector<double> stamps = Stamps(source.get());
+  ASSERT_EQ(stamps.size(), 5u);
+  EXPECT_EQ(stamps[0], 0);
+  for (size_t i = 1; i < stamps.size(); ++i) EXPECT_GT(stamps[i], stamps[i - 1]);
+  EXPECT_GT(stamps[2] - stamps[1], 2);  // two attempts
+  ASSERT_GE(events_.size(), 3u);
+  EXPECT_THAT(events_[0], HasSubstr("camera:7: no more images"));
+  EXPECT_THAT(events_[1], HasSubstr("found again after"));
+}
+
+TEST_F(LiveSourceTest, IsGivenUpAfterAMinute) {
+  const auto source = Open({2});
+  EXPECT_EQ(Stamps(source.get()).size(), 2u);
+  EXPECT_THAT(events_, ElementsAre(HasSubstr("no more images"), HasSubstr("given up")));
+  EXPECT_GT(now_s_, 1060);
+  EXPECT_LT(now_s_, 1070);
+}
+
+TEST_F(LiveSourceTest, IsGivenUpWhenItIsNotWanted) {
+  FrameSourceOptions options;
+  options.should_stop = [] { return true; };
+  const auto source = Open({2}, options);
+  EXPECT_EQ(Stamps(source.get()).size(), 2u);
+  EXPECT_LT(now_s_, 1002);
+}
+
+TEST_F(LiveSourceTest, SkipsAndCounts) {
+  FrameSourceOptions options;
+  options.start = 3;
+  options.max_frames = 4;
+  const auto source = Open({100}, options);
+  EXPECT_EQ(Stamps(source.get()).size(), 4u);
+}
+
+TEST_F(LiveSourceTest, WhatCannotBeOpenedIsAnError) {
+  EXPECT_THROW(Open({-1}), InputError);
+  EXPECT_THROW(Open({0}), InputError);
+  for (const char* name : {"camera:", "camera:x", "camera:-1", "camera:987"}) {
+    try {
+      OpenFrameSource(name);
+      FAIL() << name;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("/dev/video0 is camera:0"));
+    }
+  }
+  EXPECT_THROW(OpenFrameSource("rtsp://127.0.0.1:1/nothing"), InputError);
+}
+
+TEST(LiveSourceNameTest, IsToldFromFiles) {
+  for (const char* name : {"camera:0", "rtsp://10.0.0.1/stream", "http://host:8080/video"}) {
+    EXPECT_TRUE(IsLiveSource(name)) << name;
+  }
+  for (const char* name : {"video.mp4", "/data/camera", "camera0", "a:b"})
+    EXPECT_FALSE(IsLiveSource(name)) << name;
+}
+
+}  // namespace
+}  // namespace dynamic_slam
