@@ -165,13 +165,14 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.faults.empty()) {
     source = InjectFaults(std::move(source), ParseFaults(arguments.faults, "--inject"));
   }
-  const Camera camera = ChooseCamera(arguments.camera, arguments.source, *source);
+  const std::string source_name = WithoutPassword(arguments.source);
+  const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
   const std::filesystem::path out = OutputFolder(arguments);
   std::optional<Trajectory> truth;
   if (!arguments.truth.empty()) truth = ReadGroundTruth(arguments.truth, arguments.source);
   const bool is_realtime = arguments.mode.empty() ? source->IsLive() : arguments.mode == "realtime";
   SlamSystem system(camera, options, is_realtime ? RunMode::kRealtime : RunMode::kOffline);
-  RunRecorder recorder(arguments.source, camera, options.image);
+  RunRecorder recorder(source_name, camera, options.image);
   system.SetDetector(recorder.Record(detector));
   if (!arguments.load_map.empty()) system.LoadMap(ReadMapFile(arguments.load_map), arguments.load_map);
   if (!arguments.masks.empty() && !std::filesystem::is_directory(arguments.masks)) {
@@ -213,7 +214,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     if (viewer.has_value()) viewer->Watch(progress, &system, control.should_stop);
   };
   RunSummary summary = RunSequence(*source, system, control);
-  summary.source = arguments.source;
+  summary.source = source_name;
   console.End();
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);

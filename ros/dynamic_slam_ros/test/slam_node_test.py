@@ -90,6 +90,7 @@ class SlamNodeTest(unittest.TestCase):
         diagnostics = self.listen("/diagnostics", DiagnosticArray)
         node = start_node(with_boxes())
         self.service("reset", Trigger)
+        wait_until(lambda: len(diagnostics), "the first diagnostics have come")
         self.play()
         last_stamp = rospy.Time(0)
         wait_until(lambda: len(path) and path.messages[-1].header.stamp == poses.messages[-1].header.stamp,

@@ -139,9 +139,18 @@ bool IsLiveSource(const std::string& name) {
   return name.starts_with(kCameraPrefix) || name.find("://") != std::string::npos;
 }
 
+std::string WithoutPassword(std::string name) {
+  const size_t scheme = name.find("://");
+  if (scheme == std::string::npos) return name;
+  const size_t user = scheme + 3, at = name.substr(0, name.find('/', user)).rfind('@');
+  if (at == std::string::npos) return name;
+  const size_t colon = name.find(':', user);
+  return colon < at ? name.replace(colon + 1, at - colon - 1, "***") : name;
+}
+
 std::unique_ptr<FrameSource> MakeLiveSource(const std::string& name, std::unique_ptr<ImageGrabber> grabber,
                                             const FrameSourceOptions& options, LiveClock clock) {
-  return std::make_unique<LiveSource>(name, std::move(grabber), options, std::move(clock));
+  return std::make_unique<LiveSource>(WithoutPassword(name), std::move(grabber), options, std::move(clock));
 }
 
 std::unique_ptr<FrameSource> OpenLiveSource(const std::string& name, const FrameSourceOptions& options) {

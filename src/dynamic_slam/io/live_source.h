@@ -13,6 +13,9 @@ namespace dynamic_slam {
 // "camera:0", the number of a video device, or a stream: "rtsp://...", "http://...".
 bool IsLiveSource(const std::string& name);
 
+// The name as it may be shown and kept: "rtsp://user:***@host/stream".
+std::string WithoutPassword(std::string name);
+
 // Something that gives images for as long as it is there.
 class ImageGrabber {
  public:

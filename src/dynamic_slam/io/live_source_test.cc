@@ -116,5 +116,20 @@ TEST(LiveSourceNameTest, IsToldFromFiles) {
     EXPECT_FALSE(IsLiveSource(name)) << name;
 }
 
+TEST(LiveSourceNameTest, IsShownWithoutThePassword) {
+  EXPECT_EQ(WithoutPassword("rtsp://me:secret@10.0.0.1:554/a"), "rtsp://me:***@10.0.0.1:554/a");
+  EXPECT_EQ(WithoutPassword("rtsp://me:s@cret@host/a@b"), "rtsp://me:***@host/a@b");
+  for (const char* name : {"rtsp://10.0.0.1:554/a", "rtsp://me@host/a:b", "http://host/a:b@c", "camera:0",
+                           "video:1@2.mp4", "rtsp://"}) {
+    EXPECT_EQ(WithoutPassword(name), name);
+  }
+  try {
+    OpenFrameSource("rtsp://me:secret@127.0.0.1:1/nothing");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), Not(HasSubstr("secret")));
+  }
+}
+
 }  // namespace
 }  // namespace dynamic_slam
