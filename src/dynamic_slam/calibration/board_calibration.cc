@@ -77,7 +77,20 @@ Solution Solve(const std::vector<BoardView>& views, const Board& board, LensMode
                                cv::fisheye::CALIB_USE_INTRINSIC_GUESS,
                            until);
   } else {
-    cv::calibrateCamera(on_board, seen, size, K, distortion, solution.rotations, translations, 0, until);
+    cv::Mat1d deviations;
+    cv::calibrateCamera(on_board, seen, size, K, distortion, solution.rotations, translations, deviations,
+                        cv::noArray(), cv::noArray(), 0, until);
+    // Decentring looks much like another centre: where it is not certain to be there, it moves that by
+    // pixels.
+    constexpr double kCertain = 3;  // standard deviations
+    constexpr size_t kP1 = 2, kIntrinsics = 4;
+    const auto is_certain = [&](size_t p) {
+      return std::abs(distortion[p]) > kCertain * deviations(static_cast<int>(kIntrinsics + p));
+    };
+    if (!is_certain(kP1) && !is_certain(kP1 + 1)) {
+      cv::calibrateCamera(on_board, seen, size, K, distortion, solution.rotations, translations,
+                          cv::CALIB_ZERO_TANGENT_DIST, until);
+    }
   }
   solution.camera = ToCamera(K, distortion, model, size);
   for (size_t i = 0; i < views.size(); ++i) {
