@@ -1,6 +1,10 @@
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
@@ -22,6 +26,7 @@
 #endif
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/worker.h"
+#include "run_viewer.h"
 
 namespace {
 
@@ -51,7 +56,9 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddViewCommand(app);
 #endif
   try {
-    app.parse(argc, argv);  // runs the subcommand
+    std::vector<std::string> arguments = dynamic_slam::WithViewerPort({argv + 1, argv + argc});
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+    app.parse(std::move(arguments));                   // runs the subcommand
     return exit_code;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitInput;  // --help and --version end here with 0
