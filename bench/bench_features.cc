@@ -1,12 +1,14 @@
-// Time of the ORB extractor beside that of OpenCV's on the same images, and their ratio. Absolute times do
-// not transfer between machines; the ratio does, roughly.
+// Time of the ORB extractor beside that of OpenCV's on the same images, and their ratio; of its parts, of
+// matching and of the place index. Absolute times do not transfer between machines; ratios do, roughly.
 //
 // With DYNAMIC_SLAM_DATA set the images are frames of tum_fr1_desk, else drawn textures.
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -17,7 +19,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "dynamic_slam/base/random.h"
+#include "dynamic_slam/features/downscaler.h"
+#include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/features/orb_extractor.h"
+#include "dynamic_slam/features/place_index.h"
 
 namespace dynamic_slam {
 namespace {
@@ -111,6 +116,78 @@ void BM_Orb(benchmark::State& state) {
 }
 BENCHMARK_TEMPLATE(BM_Orb, Ours)->Arg(1000)->Arg(2000)->Arg(5000)->Unit(benchmark::kMillisecond);
 BENCHMARK_TEMPLATE(BM_Orb, OpenCv)->Arg(1000)->Arg(2000)->Arg(5000)->Unit(benchmark::kMillisecond);
+
+void BM_Pyramid(benchmark::State& state) {
+  const std::vector<cv::Mat>& images = Images();
+  std::vector<cv::Mat> levels(8);
+  std::vector<Downscaler> downscalers;
+  double scale = 1;
+  for (size_t i = 0; i < levels.size(); ++i, scale *= 1.2) {
+    levels[i].create(cvRound(480 / scale), cvRound(640 / scale), CV_8UC1);
+    if (i > 0) downscalers.emplace_back(levels[i - 1].size(), levels[i].size());
+  }
+  size_t next = 0;
+  for (auto _ : state) {
+    levels[0] = images[next++ % images.size()];
+    for (size_t i = 1; i < levels.size(); ++i) downscalers[i - 1].Run(levels[i - 1], &levels[i]);
+  }
+}
+BENCHMARK(BM_Pyramid)->Unit(benchmark::kMillisecond);
+
+// Features of an image, and a turned copy of their descriptors to look for: N windows of 15 px.
+void BM_FindInWindow(benchmark::State& state) {
+  FeatureSet features;
+  OrbOptions options;
+  OrbExtractor(options, BenchCamera()).Extract(Images().front(), {}, &features);
+  KeypointGrid grid;
+  grid.Build(features, BenchCamera().IdealBounds());
+  for (auto _ : state) {
+    size_t found = 0;
+    for (size_t i = 0; i < features.size(); ++i) {
+      const Keypoint& keypoint = features.keypoints[i];
+      const SearchWindow window{keypoint.x + 3, keypoint.y - 3, 15, keypoint.octave - 1, keypoint.octave + 1};
+      found += FindInWindow(features, grid, window, features.descriptors[i], {}).Found();
+    }
+    benchmark::DoNotOptimize(found);
+  }
+  state.counters["windows"] = static_cast<double>(features.size());
+}
+BENCHMARK(BM_FindInWindow)->Unit(benchmark::kMillisecond);
+
+// All descriptors of one image against all of another, both ways.
+void BM_MatchMutual(benchmark::State& state) {
+  std::array<FeatureSet, 2> features;
+  std::array<std::vector<uint32_t>, 2> all;
+  OrbExtractor extractor({}, BenchCamera());
+  for (size_t i = 0; i < 2; ++i) {
+    extractor.Extract(Images()[i], {}, &features[i]);
+    all[i].resize(features[i].size());
+    std::iota(all[i].begin(), all[i].end(), 0u);
+  }
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(MatchMutual(features[0], all[0], features[1], all[1], kLooseDistance, 0.8));
+  }
+}
+BENCHMARK(BM_MatchMutual)->Unit(benchmark::kMillisecond);
+
+// A question to an index of N keyframes.
+void BM_PlaceQuery(benchmark::State& state) {
+  const std::vector<cv::Mat>& images = Images();
+  OrbExtractor extractor({}, BenchCamera());
+  PlaceIndex index;
+  std::vector<std::vector<uint64_t>> words;
+  for (const cv::Mat& image : images) {
+    FeatureSet features;
+    extractor.Extract(image, {}, &features);
+    words.push_back(PlaceWords(features, {}, 0.5f));
+  }
+  for (uint32_t i = 0; i < static_cast<uint32_t>(state.range(0)); ++i) {
+    index.Add(KeyframeId(i), words[i % words.size()]);
+  }
+  size_t next = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(index.Query(words[next++ % words.size()]));
+}
+BENCHMARK(BM_PlaceQuery)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 double ThreadSeconds() {
   timespec time;

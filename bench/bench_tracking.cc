@@ -20,6 +20,7 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
 #include "dynamic_slam/io/camera_file.h"
+#include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/io/image_preparer.h"
 #include "dynamic_slam/system/sequence_runner.h"
@@ -34,7 +35,9 @@ constexpr int kOrbFrameStep = 2;  // every second frame is enough for a median
 struct BenchArguments {
   std::string source;
   std::string camera;
+  std::string detector = "none";
   std::vector<std::string> assignments;
+  bool is_realtime = false;
   bool json = false;
 };
 
@@ -74,6 +77,7 @@ nlohmann::ordered_json ToJson(const TimeStatistics& times, double one_orb_ms) {
           {"mean", times.mean},
           {"p95", times.p95},
           {"max", times.max},
+          {"p95_over_median", times.p95 / times.median},
           {"median_over_orb", times.median / one_orb_ms}};
 }
 
@@ -94,7 +98,8 @@ void RunBench(const BenchArguments& arguments) {
   // Before and after the run, so that a machine that gets slower meanwhile slows both sides of the ratio.
   std::vector<double> orb_ms = TimeOpenCvOrb(arguments.source, camera);
   const double orb_before_ms = SummariseTimes(orb_ms).median;
-  SlamSystem system(camera, options);
+  SlamSystem system(camera, options, arguments.is_realtime ? RunMode::kRealtime : RunMode::kOffline);
+  system.SetDetector(MakeDetector(arguments.detector));
   const RunSummary summary = RunSequence(*source, system);
   const std::vector<double> after_ms = TimeOpenCvOrb(arguments.source, camera);
   const double orb_after_ms = SummariseTimes(after_ms).median;
@@ -108,6 +113,7 @@ void RunBench(const BenchArguments& arguments) {
                                          {"keyframes", summary.keyframes},
                                          {"landmarks", summary.landmarks},
                                          {"features", options.orb.features},
+                                         {"peak_rss_mb", summary.peak_rss_mb},
                                          {"one_orb_ms", one_orb_ms},
                                          {"one_orb_before_ms", orb_before_ms},
                                          {"one_orb_after_ms", orb_after_ms},
@@ -122,7 +128,8 @@ void RunBench(const BenchArguments& arguments) {
   Print("one ORB (OpenCV)", orb, one_orb_ms);
   Print("tracking a frame", summary.tracking_ms, one_orb_ms);
   Print("mapping a keyframe", summary.mapping_ms, one_orb_ms);
-  fmt::print("one ORB before the run {:.2f} ms, after it {:.2f} ms\n", orb_before_ms, orb_after_ms);
+  fmt::print("one ORB before the run {:.2f} ms, after it {:.2f} ms; at most {:.0f} MB of memory\n",
+             orb_before_ms, orb_after_ms, summary.peak_rss_mb);
 }
 
 int Main(int argc, char** argv) {
@@ -138,6 +145,8 @@ int Main(int argc, char** argv) {
                  "Sequence (default: tum_fr1_desk in the folder DYNAMIC_SLAM_DATA)");
   CLI::Option* camera = app.add_option("--camera", arguments.camera,
                                        "Name of a known camera, or camera file (default: what SOURCE says)");
+  app.add_option("--detector", arguments.detector, "As that of `dynamic_slam run`")->capture_default_str();
+  app.add_flag("--realtime", arguments.is_realtime, "At the pace of the time stamps, with threads");
   app.add_option("--set", arguments.assignments, "One option, key=value; may be repeated")
       ->type_name("KEY=VALUE");
   app.add_flag("--json", arguments.json, "Print one JSON object with all digits");

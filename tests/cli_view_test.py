@@ -277,16 +277,17 @@ class PageTest(Sequence):
 
     def test_a_run_is_watched_paused_stepped_saved_and_reset(self):
         with contextlib.ExitStack() as stack:
-            viewer = stack.enter_context(self.start("--mode", "realtime", name="live"))
+            viewer = stack.enter_context(self.start(name="live"))
             holder, _ = viewer.open_websocket()
             holder.sendall(masked(b"pause"))  # a browser may take longer to start than the run lasts
             page = stack.enter_context(browser.Page(viewer.url))
             page.wait_for("page.live.readyState === 1 && page.paused")
             holder.close()
-            page.evaluate("document.querySelector('[data-command=resume]').click()")
-            page.wait_for("page.facts && page.facts.keyframes >= 3 && document.body.dataset.state === 'tracking'")
-            page.evaluate("document.querySelector('[data-command=pause]').click()")
-            page.wait_for("page.paused")
+            while not page.evaluate("page.facts && page.facts.keyframes >= 3 && document.body.dataset.state === 'tracking'"):
+                frame = page.evaluate(self.FRAME)
+                page.evaluate("document.querySelector('[data-command=step]').click()")
+                page.wait_for(f"{self.FRAME} > {frame}")
+            self.assertTrue(page.evaluate("page.paused"))
             self.check_page(page)
             self.look(page, "live")
             self.assertGreater(page.evaluate("page.facts.boxes.filter((b) => b.moves).length"), 0)

@@ -7,36 +7,35 @@
 
 namespace dynamic_slam {
 
-std::vector<int> ShareOverLevels(int wanted, const std::vector<double>& weights,
-                                 const std::vector<int>& available) {
+void ShareOverLevels(int wanted, const std::vector<double>& weights, const std::vector<int>& available,
+                     std::vector<int>* shares) {
+  constexpr int kOpen = -1;  // a level that may have more than its share
   const size_t levels = weights.size();
-  std::vector<int> shares(levels, 0);
-  std::vector<bool> full(levels, false);
+  shares->assign(levels, kOpen);
   int left = wanted;
+  double scale = 0;
   for (bool again = true; again;) {
     again = false;
     double weight_left = 0;
-    for (size_t i = 0; i < levels; ++i) weight_left += full[i] ? 0 : weights[i];
-    if (weight_left <= 0) break;
-    const double scale = left / weight_left;
+    for (size_t i = 0; i < levels; ++i) weight_left += (*shares)[i] == kOpen ? weights[i] : 0;
+    if (weight_left <= 0) return;
+    scale = left / weight_left;
     for (size_t i = 0; i < levels; ++i) {
-      if (full[i] || weights[i] * scale < available[i]) continue;
-      shares[i] = available[i];
+      if ((*shares)[i] != kOpen || weights[i] * scale < available[i]) continue;
+      (*shares)[i] = available[i];
       left -= available[i];
-      full[i] = again = true;
-    }
-    if (again) continue;
-    // Rounds the running sum, not the shares, so that they add up.
-    double sum = 0;
-    int given = 0;
-    for (size_t i = 0; i < levels; ++i) {
-      if (full[i]) continue;
-      sum += weights[i] * scale;
-      shares[i] = std::min(available[i], static_cast<int>(std::lround(sum)) - given);
-      given += shares[i];
+      again = true;
     }
   }
-  return shares;
+  // Rounds the running sum, not the shares, so that they add up.
+  double sum = 0;
+  int given = 0;
+  for (size_t i = 0; i < levels; ++i) {
+    if ((*shares)[i] != kOpen) continue;
+    sum += weights[i] * scale;
+    (*shares)[i] = std::min(available[i], static_cast<int>(std::lround(sum)) - given);
+    given += (*shares)[i];
+  }
 }
 
 void CornerSelector::Select(int width, int height, int wanted, int weak_score, std::vector<Corner>* corners) {

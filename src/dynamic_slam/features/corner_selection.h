@@ -8,9 +8,9 @@
 namespace dynamic_slam {
 
 // Shares `wanted` over the levels in proportion to `weights`; what a level has too few corners for goes to
-// the others in the same proportion. Returns counts <= available, whose sum is min(wanted, sum of available).
-std::vector<int> ShareOverLevels(int wanted, const std::vector<double>& weights,
-                                 const std::vector<int>& available);
+// the others in the same proportion. shares: counts <= available, whose sum is min(wanted, sum of available).
+void ShareOverLevels(int wanted, const std::vector<double>& weights, const std::vector<int>& available,
+                     std::vector<int>* shares);
 
 // Chooses strong corners that are evenly spread: square cells of about the area that one wanted corner has,
 // first the strongest corner of each cell, then the second strongest, and so on. In a round that does not fit

@@ -10,14 +10,20 @@
 namespace dynamic_slam {
 namespace {
 
+std::vector<int> Shares(int wanted, const std::vector<double>& weights, const std::vector<int>& available) {
+  std::vector<int> shares = {1, 2, 3, 4, 5};  // of another call
+  ShareOverLevels(wanted, weights, available, &shares);
+  return shares;
+}
+
 TEST(ShareOverLevels, IsInProportion) {
-  EXPECT_THAT(ShareOverLevels(70, {4, 2, 1}, {1000, 1000, 1000}), testing::ElementsAre(40, 20, 10));
+  EXPECT_THAT(Shares(70, {4, 2, 1}, {1000, 1000, 1000}), testing::ElementsAre(40, 20, 10));
 }
 
 TEST(ShareOverLevels, GivesOnWhatALevelCannotUse) {
-  EXPECT_THAT(ShareOverLevels(70, {4, 2, 1}, {10, 1000, 1000}), testing::ElementsAre(10, 40, 20));
-  EXPECT_THAT(ShareOverLevels(70, {4, 2, 1}, {10, 1000, 3}), testing::ElementsAre(10, 57, 3));
-  EXPECT_THAT(ShareOverLevels(70, {4, 2, 1}, {10, 5, 0}), testing::ElementsAre(10, 5, 0));
+  EXPECT_THAT(Shares(70, {4, 2, 1}, {10, 1000, 1000}), testing::ElementsAre(10, 40, 20));
+  EXPECT_THAT(Shares(70, {4, 2, 1}, {10, 1000, 3}), testing::ElementsAre(10, 57, 3));
+  EXPECT_THAT(Shares(70, {4, 2, 1}, {10, 5, 0}), testing::ElementsAre(10, 5, 0));
 }
 
 TEST(ShareOverLevels, SumsUpToTheRequest) {
@@ -30,7 +36,7 @@ TEST(ShareOverLevels, SumsUpToTheRequest) {
       available.push_back(static_cast<int>(random.Index(400)));
     }
     const int wanted = static_cast<int>(random.Index(2000));
-    const std::vector<int> shares = ShareOverLevels(wanted, weights, available);
+    const std::vector<int> shares = Shares(wanted, weights, available);
     for (size_t i = 0; i < shares.size(); ++i) EXPECT_TRUE(shares[i] >= 0 && shares[i] <= available[i]);
     EXPECT_EQ(std::accumulate(shares.begin(), shares.end(), 0),
               std::min(wanted, std::accumulate(available.begin(), available.end(), 0)));

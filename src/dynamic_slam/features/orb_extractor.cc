@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/features/corner_selection.h"
+#include "dynamic_slam/features/downscaler.h"
 #include "dynamic_slam/features/fast_detector.h"
 #include "dynamic_slam/features/smoothing.h"
 #include "dynamic_slam/features/steered_brief.h"
@@ -45,6 +46,9 @@ class OrbExtractor::Impl {
       weights_.push_back(1 / scale);
       scale *= options.scale_factor;
     }
+    for (size_t i = 1; i < levels_.size(); ++i) {
+      downscalers_.emplace_back(levels_[i - 1].image.size(), levels_[i].image.size());
+    }
     available_.resize(levels_.size());
     MaskBlindPixels(camera);
   }
@@ -58,7 +62,7 @@ class OrbExtractor::Impl {
     levels_[0].image = grey;  // shares the pixels
     for (size_t i = 0; i < levels_.size(); ++i) {
       Level& level = levels_[i];
-      if (i > 0) cv::resize(levels_[i - 1].image, level.image, level.image.size(), 0, 0, cv::INTER_LINEAR);
+      if (i > 0) downscalers_[i - 1].Run(levels_[i - 1].image, &level.image);
       level.corners.clear();
       // Not in the paper: on a slightly smoothed image FAST finds more of the same corners again, by a tenth.
       Smooth(level.image, &level.smoothed, &row_);
@@ -67,10 +71,10 @@ class OrbExtractor::Impl {
       if (!blind_.empty()) DropMasked(blind_, &level);
       available_[i] = static_cast<int>(level.corners.size());
     }
-    const std::vector<int> wanted = ShareOverLevels(options_.features, weights_, available_);
+    ShareOverLevels(options_.features, weights_, available_, &wanted_);
     for (size_t i = 0; i < levels_.size(); ++i) {
       Level& level = levels_[i];
-      selector_.Select(level.image.cols, level.image.rows, wanted[i], options_.fast_threshold,
+      selector_.Select(level.image.cols, level.image.rows, wanted_[i], options_.fast_threshold,
                        &level.corners);
       if (!level.corners.empty()) Describe(level, static_cast<int>(i), features);
     }
@@ -137,9 +141,10 @@ class OrbExtractor::Impl {
   cv::Mat blind_;    // CV_8UC1, 1 where not Camera::CanSee; empty when the camera can see everywhere
   cv::Mat blurred_;  // CV_8UC1, the memory of Level::blurred
   std::vector<Level> levels_;
-  std::vector<double> weights_;  // share of the features: 1 / scale
-  std::vector<int> available_;
-  std::vector<uint8_t> row_;  // scratch of Smooth
+  std::vector<double> weights_;          // share of the features: 1 / scale
+  std::vector<Downscaler> downscalers_;  // to each level but the finest
+  std::vector<int> available_, wanted_;  // corners of each level
+  std::vector<uint8_t> row_;             // scratch of Smooth
 };
 
 OrbExtractor::OrbExtractor(const OrbOptions& options, const Camera& camera)

@@ -12,7 +12,6 @@ KeyframeId InsertKeyframe(const Frame& frame, Map* map, PartId part) {
     const LandmarkId landmark = map->Resolve(frame.landmarks[keypoint]);
     if (!landmark.IsValid() || map->landmarks().At(landmark).IsSeenBy(id)) continue;
     map->Link(id, keypoint, landmark);
-    map->RefreshLandmark(landmark);
   }
   return id;
 }

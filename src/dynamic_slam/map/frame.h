@@ -53,7 +53,8 @@ struct AnchoredPose {
 
 class Map;
 
-// Makes the frame a keyframe that sees the frame's landmarks, in a part of the map.
+// Makes the frame a keyframe that sees the frame's landmarks, in a part of the map. These are not refreshed
+// (Map::RefreshLandmark): local mapping does it, so that tracking need not.
 KeyframeId InsertKeyframe(const Frame& frame, Map* map, PartId part = PartId(0));
 
 }  // namespace dynamic_slam

@@ -8,15 +8,20 @@ namespace dynamic_slam {
 
 std::vector<CovisibleKeyframe> Keyframe::BestCovisible(size_t count, int min_weight) const {
   std::vector<CovisibleKeyframe> best;
+  BestCovisible(count, min_weight, &best);
+  return best;
+}
+
+void Keyframe::BestCovisible(size_t count, int min_weight, std::vector<CovisibleKeyframe>* best) const {
+  best->clear();
   for (const CovisibleKeyframe& other : covisible_) {
-    if (other.weight >= min_weight) best.push_back(other);
+    if (other.weight >= min_weight) best->push_back(other);
   }
   // Among equals the younger keyframe: it is the nearer in time.
-  std::sort(best.begin(), best.end(), [](const CovisibleKeyframe& a, const CovisibleKeyframe& b) {
+  std::sort(best->begin(), best->end(), [](const CovisibleKeyframe& a, const CovisibleKeyframe& b) {
     return a.weight != b.weight ? a.weight > b.weight : a.id > b.id;
   });
-  if (best.size() > count) best.resize(count);
-  return best;
+  if (best->size() > count) best->resize(count);
 }
 
 void Keyframe::ChangeWeight(KeyframeId other, int change) {

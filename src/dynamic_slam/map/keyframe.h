@@ -65,8 +65,10 @@ class Keyframe {
   // Keyframes that share landmarks, by id.
   const std::vector<CovisibleKeyframe>& covisible() const { return covisible_; }
 
-  // At most `count` keyframes with at least `min_weight` shared landmarks, the most shared first.
+  // At most `count` keyframes with at least `min_weight` shared landmarks, the most shared first. The second
+  // form keeps the buffer of *best.
   std::vector<CovisibleKeyframe> BestCovisible(size_t count, int min_weight = 1) const;
+  void BestCovisible(size_t count, int min_weight, std::vector<CovisibleKeyframe>* best) const;
 
  private:
   friend class Map;

@@ -22,7 +22,8 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
   view->reference = KeyframeId();
   view->revision = map.revision();
 
-  votes_.assign(map.keyframes().CreatedCount(), 0);
+  votes_.resize(map.keyframes().CreatedCount());
+  std::fill(votes_.begin(), votes_.end(), 0);
   for (const LandmarkId id : seen) {
     const Landmark* landmark = map.landmarks().Find(id);
     if (landmark == nullptr) continue;
@@ -43,12 +44,15 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     view->reference_unit = map.keyframes().At(view->reference).unit();
   }
   const size_t limit = static_cast<size_t>(max_keyframes);
-  std::stable_sort(keyframes_.begin(), keyframes_.end(),
-                   [this](KeyframeId a, KeyframeId b) { return votes_[a.value()] > votes_[b.value()]; });
+  std::sort(keyframes_.begin(), keyframes_.end(), [this](KeyframeId a, KeyframeId b) {
+    const int votes_a = votes_[a.value()], votes_b = votes_[b.value()];
+    return votes_a != votes_b ? votes_a > votes_b : a < b;
+  });
   if (keyframes_.size() > limit) keyframes_.resize(limit);
   const size_t direct = keyframes_.size();
   for (size_t i = 0; i < direct && keyframes_.size() < limit; ++i) {
-    for (const CovisibleKeyframe& other : map.keyframes().At(keyframes_[i]).BestCovisible(kNeighbours)) {
+    map.keyframes().At(keyframes_[i]).BestCovisible(kNeighbours, 1, &neighbours_);
+    for (const CovisibleKeyframe& other : neighbours_) {
       if (votes_[other.id.value()] != 0 || keyframes_.size() >= limit) continue;
       votes_[other.id.value()] = -1;  // taken
       keyframes_.push_back(other.id);

@@ -1,5 +1,8 @@
 #include "dynamic_slam/mapping/local_mapper.h"
 
+#include <algorithm>
+#include <span>
+
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 
@@ -35,7 +38,7 @@ MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
     result.bundle = AdjustLocal(camera_, options_, keyframe, epoch_, should_stop, map_);
     return true;
   };
-  const bool done = Change([&](Map* map) {
+  const bool done = RefreshSeen(keyframe) && Change([&](Map* map) {
                       CullRecentLandmarks(keyframe, map, &result);
                       CullMovedLandmarks(keyframe, map, &result);
                     }) &&
@@ -47,6 +50,25 @@ MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
 
 BundleSummary LocalMapper::Finish(const std::function<bool()>& should_stop) {
   return AdjustAll(camera_, options_, should_stop, map_);
+}
+
+// What tracking found in the keyframe looks a little different since; a few at a time, as tracking may wait.
+bool LocalMapper::RefreshSeen(KeyframeId current) {
+  DS_TRACE("mapping/refresh landmarks");
+  constexpr size_t kAtATime = 50;
+  std::vector<LandmarkId> seen;
+  if (!Look([&](const Map& map) { seen = map.keyframes().At(current).landmarks(); })) return false;
+  std::erase_if(seen, [](LandmarkId id) { return !id.IsValid(); });
+  for (size_t begin = 0; begin < seen.size(); begin += kAtATime) {
+    const auto some = std::span(seen).subspan(begin, std::min(kAtATime, seen.size() - begin));
+    const bool is_there = Change([&](Map* map) {
+      for (const LandmarkId id : some) {
+        if (map->landmarks().Find(id) != nullptr) map->RefreshLandmark(id);
+      }
+    });
+    if (!is_there) return false;
+  }
+  return true;
 }
 
 void LocalMapper::CullRecentLandmarks(KeyframeId current, Map* map, MappingResult* result) {

@@ -55,6 +55,7 @@ class LocalMapper {
   }
 
   // One step each; false when the map was given up.
+  bool RefreshSeen(KeyframeId current);
   bool CreateLandmarks(KeyframeId current, MappingResult* result);
   bool FuseLandmarks(KeyframeId current, MappingResult* result);
   bool CullRedundantKeyframes(KeyframeId current, MappingResult* result);

@@ -106,14 +106,16 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
 
 int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* frame,
                                std::vector<uint8_t>* in_view) {
-  in_view->assign(view.size(), 0);
+  in_view->resize(view.size());
+  std::fill(in_view->begin(), in_view->end(), uint8_t{0});
   TakeUnusable(*frame);
   uint32_t max_id = 0;
   for (const LandmarkId id : view.ids) max_id = std::max(max_id, id.value());
   for (const LandmarkId id : frame->landmarks) {
     if (id.IsValid()) max_id = std::max(max_id, id.value());
   }
-  landmark_known_.assign(max_id + 1, 0);
+  landmark_known_.resize(max_id + 1);
+  std::fill(landmark_known_.begin(), landmark_known_.end(), uint8_t{0});
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     if (!frame->landmarks[i].IsValid()) continue;
     taken_[i] = 1;
