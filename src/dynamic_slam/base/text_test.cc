@@ -75,6 +75,16 @@ TEST(ReadDataLines, SkipsCommentsAndBlanksAndCountsThem) {
   EXPECT_EQ(lines[1].text, "second");
 }
 
+TEST(ReadFile, WhatHasNoEndIsRefused) {
+  try {
+    ReadFile("/dev/zero", "Give a file.");
+    FAIL() << "it has no end";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("/dev/zero: does not end"));
+    EXPECT_THAT(e.what(), HasSubstr("Give a file."));
+  }
+}
+
 TEST(ReadFile, NamesTheFileAndTheReason) {
   const auto folder = TestFolder();
   try {
