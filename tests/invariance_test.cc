@@ -141,10 +141,10 @@ TEST(Invariance, OfTheInformationToHowItIsDerived) {
   Random random(3);
   const Camera camera = SyntheticCamera();
   const Rigid3 truth(ExpSo3({0.3, -0.5, 0.2}), {1.0, -2.0, 3.0});
-  const PoseObservations seen = SyntheticPoseObservations(truth, 60, 0, 0.3, &random);
+  const PoseObservations seen = SyntheticPoseObservations(truth, 61, 0, 0.3, &random);  // fills no block
   PoseEstimate estimate;
   PoseOptimizer(camera).Optimize(seen, truth, &estimate);
-  ASSERT_TRUE(estimate.converged);
+  ASSERT_EQ(estimate.inliers, 61);
   Eigen::Matrix<double, 6, 6> numeric = Eigen::Matrix<double, 6, 6>::Zero();
   for (size_t i = 0; i < seen.size(); ++i) {
     if (estimate.is_inlier[i] == 0) continue;

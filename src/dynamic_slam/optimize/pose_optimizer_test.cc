@@ -85,6 +85,29 @@ TEST(PoseOptimizer, FindsThePoseAmongOutliers) {
   }
 }
 
+TEST(PoseOptimizer, FindsThePoseAmongSixtyPercentOfOutliersNearlyAlways) {
+  int found = 0;
+  for (uint64_t seed = 0; seed < 100; ++seed) {
+    Random random(seed);
+    const PoseObservations observations = SyntheticPoseObservations(TruePose(), 200, 120, 0.5, &random);
+    const PoseEstimate estimate = Optimize(observations, Perturbed(TruePose(), 0.03, 0.06, &random));
+    if (estimate.converged && PoseError(estimate.cam_from_world, TruePose()) < 0.01) ++found;
+  }
+  EXPECT_GE(found, 90);  // with the same limit in all rounds: 62
+}
+
+TEST(PoseOptimizer, HowFarOffAnOutlierIsDependsOnItsOctave) {
+  Random random(1);
+  PoseObservations observations = SyntheticPoseObservations(TruePose(), 50, 0, 0.0, &random);
+  observations.u[0] += 6;
+  observations.u[1] += 6;
+  observations.inverse_sigma_px[0] = 0.25;
+  const PoseEstimate estimate = Optimize(observations, TruePose());
+  EXPECT_EQ(estimate.is_inlier[0], 1);
+  EXPECT_EQ(estimate.is_inlier[1], 0);
+  EXPECT_EQ(estimate.inliers, 49);
+}
+
 TEST(PoseOptimizer, OutliersComeBackWhenThePoseExplainsThem) {
   // From a start this far no point is within chi2, yet at the end all are.
   Random random(7);
