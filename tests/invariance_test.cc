@@ -136,34 +136,6 @@ TEST(Invariance, OfABundleToTheWorld) {
   }
 }
 
-// The information is J^T W J: by the errors of the pixels, central differences along each increment.
-TEST(Invariance, OfTheInformationToHowItIsDerived) {
-  Random random(3);
-  const Camera camera = SyntheticCamera();
-  const Rigid3 truth(ExpSo3({0.3, -0.5, 0.2}), {1.0, -2.0, 3.0});
-  const PoseObservations seen = SyntheticPoseObservations(truth, 61, 0, 0.3, &random);  // fills no block
-  PoseEstimate estimate;
-  PoseOptimizer(camera).Optimize(seen, truth, &estimate);
-  ASSERT_EQ(estimate.inliers, 61);
-  Eigen::Matrix<double, 6, 6> numeric = Eigen::Matrix<double, 6, 6>::Zero();
-  for (size_t i = 0; i < seen.size(); ++i) {
-    if (estimate.is_inlier[i] == 0) continue;
-    Eigen::Matrix<double, 2, 6> J;
-    for (int k = 0; k < 6; ++k) {
-      const auto project = [&](double step) {
-        Eigen::Matrix<double, 6, 1> increment = Eigen::Matrix<double, 6, 1>::Zero();
-        increment[k] = step;
-        const Rigid3 moved = Rigid3(ExpSo3(increment.head<3>()), Eigen::Vector3d(increment.tail<3>())) *
-                             estimate.cam_from_world;
-        return camera.Project(moved * Eigen::Vector3d(seen.x[i], seen.y[i], seen.z[i]));
-      };
-      J.col(k) = (project(1e-6) - project(-1e-6)) / 2e-6;
-    }
-    numeric += J.transpose() * J;
-  }
-  EXPECT_LT((estimate.information - numeric).norm(), 1e-5 * numeric.norm());
-}
-
 Trajectory RunRoom(const std::vector<cv::Mat>& images, const Camera& camera, double first_stamp_s) {
   SlamSystem system(camera, SmallRoom::CheapOptions());
   // Eighths of a second: differences are exact, whatever is added.

@@ -67,6 +67,32 @@ TEST(PoseOptimizer, InformationPredictsTheScatterOfNoisyPoses) {
   EXPECT_NEAR(rms, std::sqrt(2.0), 0.1);
 }
 
+// The information is J^T W J: by the errors of the pixels, central differences along each increment.
+TEST(PoseOptimizer, InformationEqualsThatOfNumericDifferences) {
+  Random random(3);
+  const Camera camera = SyntheticCamera();
+  const PoseObservations seen = SyntheticPoseObservations(TruePose(), 61, 0, 0.3, &random);  // fills no block
+  const PoseEstimate estimate = Optimize(seen, TruePose());
+  ASSERT_EQ(estimate.inliers, 61);
+  Eigen::Matrix<double, 6, 6> numeric = Eigen::Matrix<double, 6, 6>::Zero();
+  for (size_t i = 0; i < seen.size(); ++i) {
+    if (estimate.is_inlier[i] == 0) continue;
+    Eigen::Matrix<double, 2, 6> J;
+    for (int k = 0; k < 6; ++k) {
+      const auto project = [&](double step) {
+        Eigen::Matrix<double, 6, 1> increment = Eigen::Matrix<double, 6, 1>::Zero();
+        increment[k] = step;
+        const Rigid3 moved = Rigid3(ExpSo3(increment.head<3>()), Eigen::Vector3d(increment.tail<3>())) *
+                             estimate.cam_from_world;
+        return camera.Project(moved * Eigen::Vector3d(seen.x[i], seen.y[i], seen.z[i]));
+      };
+      J.col(k) = (project(1e-6) - project(-1e-6)) / 2e-6;
+    }
+    numeric += J.transpose() * J;
+  }
+  EXPECT_LT((estimate.information - numeric).norm(), 1e-5 * numeric.norm());
+}
+
 TEST(PoseOptimizer, FindsThePoseAmongOutliers) {
   for (const int outliers : {80, 100}) {
     for (uint64_t seed = 0; seed < 50; ++seed) {
