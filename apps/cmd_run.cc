@@ -201,7 +201,10 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   SlamSystem system(camera, options, is_realtime ? RunMode::kRealtime : RunMode::kOffline);
   RunRecorder recorder(source_name, camera, options.image);
   system.SetDetector(recorder.Record(detector));
-  if (!arguments.load_map.empty()) system.LoadMap(ReadMapFile(arguments.load_map), arguments.load_map);
+  const auto load_map = [&] {
+    if (!arguments.load_map.empty()) system.LoadMap(ReadMapFile(arguments.load_map), arguments.load_map);
+  };
+  load_map();
   if (!arguments.masks.empty() && !std::filesystem::is_directory(arguments.masks)) {
     throw InputError(arguments.masks, "is no folder", "Give --masks the folder with a PNG for each image.");
   }
@@ -227,6 +230,10 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (arguments.viewer.IsWanted()) {
     viewer.emplace(arguments.viewer, out, out.filename().string(), camera, options, system.mode());
   }
+  const auto reset = [&] {
+    system.Reset();
+    load_map();
+  };
   RunJournal journal(out);
   Checkpoint checkpoint(arguments.save_map, arguments.save_map_every_min, console);
   control.on_frame = [&](const RunProgress& progress) {
@@ -240,7 +247,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     recorder.Watch(progress);
     if (overlay.has_value()) overlay->Write(progress);
     if (masks.has_value()) masks->Write(*progress.image, *progress.result);
-    if (viewer.has_value()) viewer->Watch(progress, &system, control.should_stop);
+    if (viewer.has_value()) viewer->Watch(progress, system, reset, control.should_stop);
   };
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = source_name;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -7,6 +8,8 @@
 #include <new>
 #include <string>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
@@ -29,6 +32,7 @@
 #endif
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/worker.h"
+#include "run_viewer.h"
 
 namespace {
 
@@ -89,7 +93,9 @@ int Main(int argc, char** argv) {
   dynamic_slam::AddViewCommand(app);
 #endif
   try {
-    app.parse(argc, argv);  // runs the subcommand
+    std::vector<std::string> arguments = dynamic_slam::WithViewerPort({argv + 1, argv + argc});
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+    app.parse(std::move(arguments));                   // runs the subcommand
     return IsOutputWhole() ? exit_code : ReportOutput(errno);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitInput;  // --help and --version end here with 0

@@ -29,6 +29,15 @@ void AddViewerOptions(CLI::App* command, ViewerArguments* arguments) {
   command->add_flag("--record", arguments->is_recorded, "Record the run for `dynamic_slam view`");
 }
 
+std::vector<std::string> WithViewerPort(std::vector<std::string> arguments) {
+  for (size_t i = 0; i + 1 < arguments.size(); ++i) {
+    const std::string& next = arguments[i + 1];
+    const bool is_number = !next.empty() && next.find_first_not_of("0123456789") == std::string::npos;
+    if (arguments[i] == "--viewer" && !is_number) arguments[i] += fmt::format("={}", kPort);
+  }
+  return arguments;
+}
+
 void AddServerOptions(CLI::App* command, const std::string& port_option, ViewerArguments* arguments) {
   command
       ->add_option_function<uint16_t>(
@@ -54,23 +63,23 @@ RunViewer::RunViewer(const ViewerArguments& arguments, std::filesystem::path out
   std::fflush(stdout);  // whoever waits for the address
 }
 
-void RunViewer::Watch(const RunProgress& progress, SlamSystem* system,
-                      const std::function<bool()>& should_stop) {
-  view_.Watch(progress, *system);
+void RunViewer::Watch(const RunProgress& progress, const SlamSystem& system,
+                      const std::function<void()>& reset, const std::function<bool()>& should_stop) {
+  view_.Watch(progress, system);
   while (true) {
     const RunWishes wishes = view_.WaitForWishes(should_stop);
     if (!wishes.saves_map && !wishes.resets) return;
     if (wishes.saves_map) {
       const std::filesystem::path file = out_ / "viewer.map";
       try {
-        WriteMapFile(file, system->camera(), *system->map().Read());
+        WriteMapFile(file, system.camera(), *system.map().Read());
         view_.Tell("good", "The map is saved: " + file.string());
       } catch (const InputError& error) {
         view_.Tell("bad", error.what());
       }
     }
     if (wishes.resets) {
-      system->Reset();
+      reset();
       view_.WasReset();
     } else {
       view_.ShowEvents();

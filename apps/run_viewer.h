@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -24,6 +25,10 @@ struct ViewerArguments {
 // The options of `run`.
 void AddViewerOptions(CLI::App* command, ViewerArguments* arguments);
 
+// The program's arguments, in which a `--viewer` before something that is no number has its usual port: what
+// follows is not its.
+std::vector<std::string> WithViewerPort(std::vector<std::string> arguments);
+
 // --viewer-address, and the port under the name that is given.
 void AddServerOptions(CLI::App* command, const std::string& port_option, ViewerArguments* arguments);
 
@@ -36,8 +41,10 @@ class RunViewer {
   RunViewer(const ViewerArguments& arguments, std::filesystem::path out, const std::string& source,
             const Camera& raw_camera, const SystemOptions& options, RunMode mode);
 
-  // To be called last after each frame: returns when the run goes on.
-  void Watch(const RunProgress& progress, SlamSystem* system, const std::function<bool()>& should_stop);
+  // To be called last after each frame: returns when the run goes on. reset: makes the system what it was
+  // before the first frame.
+  void Watch(const RunProgress& progress, const SlamSystem& system, const std::function<void()>& reset,
+             const std::function<bool()>& should_stop);
 
   void Finish(const SlamSystem& system) { view_.Finish(system); }
 
@@ -57,6 +64,7 @@ struct ViewerArguments {
 };
 
 inline void AddViewerOptions(CLI::App*, ViewerArguments*) {}
+inline std::vector<std::string> WithViewerPort(std::vector<std::string> arguments) { return arguments; }
 
 struct RunViewer {
   explicit RunViewer(const auto&...) {}

@@ -219,6 +219,13 @@ class HostileTest(Sequence):
         self.assertEqual(result.returncode, 2)
         self.assertIn("'here' is no IP address", result.stderr)
 
+    def test_the_port_may_be_left_out_before_the_source(self):
+        result = subprocess.run([PROGRAM, "run", "--viewer", "/no/sequence", "--out", os.path.join(self.shared, "order")],
+                                capture_output=True, text=True)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("/no/sequence", result.stderr)
+        self.assertNotIn("--viewer", result.stderr)
+
     def test_a_browser_that_stands_still_costs_nothing(self):
         with self.start("--mode", "realtime", name="still") as viewer:
             self.assertIn("101", viewer.open_websocket()[1])
@@ -312,6 +319,14 @@ class PageTest(Sequence):
                 self.look(page, "top")
                 page.press("f")
                 self.assertTrue(page.evaluate("page.map.follows"))
+            with self.subTest("a machine that draws slowly draws fewer points while the view moves"):
+                drawn = page.evaluate("(() => { const p = page.map.points; for (let i = 0; i < 200; ++i) p.adapt(1); return [p.budget, p.choose(false)]; })()")
+                self.assertEqual(drawn, [10000, True])  # fewer than that are always all drawn
+                page.evaluate("page.map.points.budget = 50")
+                self.assertFalse(page.evaluate("page.map.points.choose(false)"))
+                self.assertEqual(page.evaluate("page.map.points.object.geometry.drawRange.count"), 50)
+                self.assertTrue(page.evaluate("page.map.points.choose(true)"))
+                page.evaluate("page.map.points.budget = 1e7")
             with self.subTest("a reset forgets the map"):
                 page.evaluate("window.confirm = () => true")
                 page.press("r")

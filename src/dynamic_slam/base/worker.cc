@@ -1,16 +1,32 @@
 #include "dynamic_slam/base/worker.h"
 
+#include <algorithm>
 #include <atomic>
 #include <utility>
+
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
 
 namespace dynamic_slam {
 namespace {
 
 std::atomic<int> abandoned_count = 0;
 
+// Linux, against POSIX, has a niceness for each thread, and any thread may raise its own.
+void GiveWayToOthers() {
+#ifdef __linux__
+  constexpr int kNiceness = 10;  // the scheduler weighs it 110, and 0 1024
+  const id_t thread = static_cast<id_t>(gettid());
+  setpriority(PRIO_PROCESS, thread, std::max(kNiceness, getpriority(PRIO_PROCESS, thread)));
+#endif
+}
+
 }  // namespace
 
-Worker::Worker(TraceName name, std::chrono::milliseconds patience) : name_(name), patience_(patience) {
+Worker::Worker(TraceName name, std::chrono::milliseconds patience, Priority priority)
+    : name_(name), patience_(patience), priority_(priority) {
   Start();
 }
 
@@ -26,8 +42,9 @@ Worker::~Worker() {
 
 void Worker::Start() {
   state_ = std::make_shared<State>();
-  thread_ = std::jthread([state = state_, name = name_] {
+  thread_ = std::jthread([state = state_, name = name_, priority = priority_] {
     TraceThreadName(name);
+    if (priority == Priority::kBackground) GiveWayToOthers();
     Run(*state);
   });
 }

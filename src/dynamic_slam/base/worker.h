@@ -26,10 +26,15 @@ class Worker {
 
   static constexpr std::chrono::milliseconds kForever = std::chrono::milliseconds::max();
 
+  // kBackground: the thread gets a processor when the others leave one, or about a tenth of one (Linux; the
+  // same as kNormal elsewhere).
+  enum class Priority { kNormal, kBackground };
+
   // patience: how long Cancel() waits for a task that does not heed the token. After that its thread is left
   // alone with it, and a new one takes its place. Tasks of a worker without endless patience must own all
   // that they touch.
-  explicit Worker(TraceName name, std::chrono::milliseconds patience = kForever);
+  explicit Worker(TraceName name, std::chrono::milliseconds patience = kForever,
+                  Priority priority = Priority::kNormal);
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
@@ -70,6 +75,7 @@ class Worker {
 
   const TraceName name_;
   const std::chrono::milliseconds patience_;
+  const Priority priority_;
   std::shared_ptr<State> state_;
   std::jthread thread_;
 };

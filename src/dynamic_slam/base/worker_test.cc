@@ -4,6 +4,11 @@
 #include <stdexcept>
 #include <vector>
 
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,6 +34,23 @@ TEST(WorkerTest, TasksRunInOrder) {
   EXPECT_THAT(done, ElementsAre(0, 1, 2, 3, 4));
   EXPECT_EQ(worker.Waiting(), 0u);
 }
+
+#ifdef __linux__
+TEST(WorkerTest, TheBackgroundGivesWayToOthers) {
+  const auto niceness_of = [](Worker::Priority priority) {
+    Worker worker("test", Worker::kForever, priority);
+    std::atomic<int> niceness = -100;
+    worker.Post(
+        [&](const std::stop_token&) { niceness = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); });
+    worker.Drain();
+    return niceness.load();
+  };
+  const int own = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
+  EXPECT_EQ(niceness_of(Worker::Priority::kNormal), own);
+  EXPECT_GE(niceness_of(Worker::Priority::kBackground), own);
+  EXPECT_GE(niceness_of(Worker::Priority::kBackground), 10);
+}
+#endif
 
 TEST(WorkerTest, CancelDropsWhatWaitsAndStopsWhatRuns) {
   Worker worker("test");

@@ -40,7 +40,8 @@ MapPicture PictureOf(const Map& map, std::span<const PathFrame> path) {
   MapPicture picture;
   picture.points.reserve(map.landmarks().size());
   map.landmarks().ForEach([&](const Landmark& landmark) {
-    picture.points.push_back({landmark.id().value(), AsFloats(landmark.position())});
+    picture.points.push_back(
+        {landmark.id().value(), map.PartOf(landmark).value(), AsFloats(landmark.position())});
   });
   picture.cameras.reserve(map.keyframes().size());
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
@@ -53,9 +54,11 @@ MapPicture PictureOf(const Map& map, std::span<const PathFrame> path) {
   });
   picture.path.reserve(path.size());
   for (const PathFrame& frame : path) {
-    if (!map.PartOf(frame.pose.reference).IsValid()) continue;
+    const PartId part = map.PartOf(frame.pose.reference);
+    if (!part.IsValid()) continue;
     const Rigid3 cam_from_world = map.PoseFromReference(frame.pose.reference, frame.pose.cam_from_reference);
-    picture.path.push_back({AsFloats(cam_from_world.TargetOriginInSource()), frame.stretch});
+    picture.path.push_back({AsFloats(cam_from_world.TargetOriginInSource()), frame.stretch, part.value()});
+    picture.part = part.value();
   }
   return picture;
 }
@@ -81,6 +84,7 @@ Message MapMessage(const MapPicture& from, const MapPicture& to, uint32_t frame,
   add_count(points.size());
   for (const MapPicture::Point* point : points) writer.Add(point->id);
   for (const MapPicture::Point* point : points) writer.Add(point->position);
+  for (const MapPicture::Point* point : points) writer.Add(point->part);
   add_count(gone_points.size());
   for (const uint32_t id : gone_points) writer.Add(id);
   add_count(cameras.size());
@@ -98,7 +102,9 @@ Message MapMessage(const MapPicture& from, const MapPicture& to, uint32_t frame,
   for (size_t i = same; i < to.path.size(); ++i) {
     writer.Add(to.path[i].position);
     writer.Add(to.path[i].stretch);
+    writer.Add(to.path[i].part);
   }
+  writer.Add(to.part);
   return writer.Finish();
 }
 

@@ -21,7 +21,7 @@ struct PathFrame {
 // of their part.
 struct MapPicture {
   struct Point {
-    uint32_t id;
+    uint32_t id, part;
     std::array<float, 3> position;
     bool operator==(const Point&) const = default;
   };
@@ -33,12 +33,13 @@ struct MapPicture {
   };
   struct PathPoint {
     std::array<float, 3> position;
-    uint32_t stretch;
+    uint32_t stretch, part;
     bool operator==(const PathPoint&) const = default;
   };
   std::vector<Point> points;    // by id
   std::vector<Camera> cameras;  // keyframes, by id
   std::vector<PathPoint> path;  // in the order of `path` below
+  uint32_t part = 0;            // where the camera was last
 };
 
 std::array<float, 7> WorldFromCam(const Rigid3& cam_from_world);

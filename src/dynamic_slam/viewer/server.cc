@@ -52,7 +52,10 @@ bool IsLoopback(const std::string& address) {
 class ViewerServer::Impl {
  public:
   Impl(const ServerOptions& options, Show* show)
-      : options_(options), show_(show), acceptor_(io_), worker_("viewer") {
+      : options_(options),
+        show_(show),
+        acceptor_(io_),
+        worker_("viewer", Worker::kForever, Worker::Priority::kBackground) {
     if (options.with_token) token_ = RandomToken();
     Listen();
   }

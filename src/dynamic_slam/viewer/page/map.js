@@ -1,12 +1,14 @@
 // The map in three dimensions. In the world y points down, so everything hangs in a group that is turned over.
 "use strict";
 
-const COLOURS = {tracking: 0x3ddc84, initialising: 0xf2b84b, lost: 0xff5a4f, path: 0xf2b84b, keyframe: 0x5cb3ff, edge: 0x3f6f9f, loop: 0xe08cff};
+const COLOURS = {tracking: 0x3ddc84, initialising: 0xf2b84b, lost: 0xff5a4f, path: 0xf2b84b, keyframe: 0x5cb3ff, edge: 0x3f6f9f, loop: 0xe08cff, other: 0x59636f};
 const FADE_IN_S = 0.5, FADE_OUT_S = 1.2, LOOP_S = 5;
+const SLOW_S = 1 / 32, FAST_S = 1 / 45, STILL_S = 0.3;  // of the time from frame to frame; then of rest, before all is drawn
+const MIN_POINTS = 10000, MAX_POINTS = 1e7;
 
 const POINT_VERTEX = `
-  attribute float born, died;
-  uniform float now, pixels, low, high;
+  attribute float born, died, part;
+  uniform float now, pixels, low, high, current;
   varying vec4 tint;
   void main() {
     vec4 seen = modelViewMatrix * vec4(position, 1.0);
@@ -16,8 +18,10 @@ const POINT_VERTEX = `
     float death = died < 0.0 ? 0.0 : clamp((now - died) / ${FADE_OUT_S.toFixed(1)}, 0.0, 1.0);
     vec3 colour = mix(vec3(0.96, 0.93, 0.86), vec3(0.38, 0.55, 0.80), height);
     colour = mix(colour, vec3(0.45, 1.0, 0.65), youth);
+    float share = 1.0;
+    if (part != current) { colour = vec3(0.42, 0.46, 0.52); share = 0.5; }
     if (died >= 0.0) colour = vec3(1.0, 0.3, 0.25);
-    tint = vec4(colour, (0.35 + 0.65 * (1.0 - youth)) * (1.0 - death));
+    tint = vec4(colour, (0.35 + 0.65 * (1.0 - youth)) * (1.0 - death) * share);
     gl_PointSize = clamp(pixels * 5.0 / -seen.z, 2.0 * pixels, 7.0 * pixels) * (1.0 + youth);
   }`;
 const POINT_FRAGMENT = `
@@ -28,12 +32,14 @@ const POINT_FRAGMENT = `
     gl_FragColor = tint;
   }`;
 
-// Landmarks: each has a place in the arrays until it has faded away.
+// Landmarks: each has a place in the arrays until it has faded away. The index has the places in random order, so that
+// its first entries are a fair picture of the whole for a machine that cannot draw them all while the view moves.
 class Points {
   constructor(parent) {
     this.material = new THREE.ShaderMaterial({
       vertexShader: POINT_VERTEX, fragmentShader: POINT_FRAGMENT, transparent: true, depthWrite: false,
-      uniforms: {now: {value: 0}, pixels: {value: devicePixelRatio}, low: {value: -1}, high: {value: 1}}});
+      uniforms: {now: {value: 0}, pixels: {value: devicePixelRatio}, low: {value: -1}, high: {value: 1}, current: {value: 0}}});
+    this.budget = MAX_POINTS;
     this.object = new THREE.Points(new THREE.BufferGeometry(), this.material);
     this.object.frustumCulled = false;
     parent.add(this.object);
@@ -51,26 +57,52 @@ class Points {
   allocate(capacity) {
     const old = this.arrays;
     this.capacity = capacity;
-    this.arrays = {position: new Float32Array(3 * capacity), born: new Float32Array(capacity), died: new Float32Array(capacity).fill(0)};
+    this.arrays = {position: new Float32Array(3 * capacity), born: new Float32Array(capacity), died: new Float32Array(capacity), part: new Float32Array(capacity), index: new Uint32Array(capacity)};
     this.object.geometry.dispose();
     const geometry = new THREE.BufferGeometry();
-    for (const [name, size] of [["position", 3], ["born", 1], ["died", 1]]) {
+    for (const name in this.arrays) {
+      const size = name === "position" ? 3 : 1;
       if (this.used > 0) this.arrays[name].set(old[name].subarray(0, size * this.used));
-      geometry.setAttribute(name, new THREE.BufferAttribute(this.arrays[name], size).setUsage(THREE.DynamicDrawUsage));
+      const attribute = new THREE.BufferAttribute(this.arrays[name], size).setUsage(THREE.DynamicDrawUsage);
+      if (name === "index") geometry.setIndex(attribute); else geometry.setAttribute(name, attribute);
     }
     this.object.geometry = geometry;
   }
 
-  set(id, x, y, z, now) {
+  set(id, part, x, y, z, now) {
     let place = this.places.get(id);
     if (place === undefined) {
-      place = this.free.length ? this.free.pop() : this.used++;
-      if (place >= this.capacity) this.allocate(2 * this.capacity);
+      place = this.free.length ? this.free.pop() : this.add();
       this.places.set(id, place);
       this.arrays.born[place] = now;
       this.arrays.died[place] = -1;
     }
-    this.arrays.position.set([x, y, z], 3 * place);
+    this.arrays.position[3 * place] = x;
+    this.arrays.position[3 * place + 1] = y;
+    this.arrays.position[3 * place + 2] = z;
+    this.arrays.part[place] = part;
+  }
+
+  // A new place, shuffled into the index.
+  add() {
+    if (this.used >= this.capacity) this.allocate(2 * this.capacity);
+    const {index} = this.arrays, at = Math.floor(Math.random() * (this.used + 1));
+    index[this.used] = index[at];
+    index[at] = this.used;
+    return this.used++;
+  }
+
+  // How many are drawn, from how long the last frame took.
+  adapt(seconds) {
+    if (seconds > SLOW_S) this.budget = Math.max(MIN_POINTS, 0.8 * Math.min(this.budget, this.used));
+    else if (seconds < FAST_S) this.budget = Math.min(MAX_POINTS, 1.1 * this.budget);
+  }
+
+  // All of them, or as many as can be drawn while the view moves. Returns whether that is all.
+  choose(isStill) {
+    const count = isStill ? this.used : Math.min(this.used, Math.floor(this.budget));
+    this.object.geometry.setDrawRange(0, count);
+    return count === this.used;
   }
 
   remove(id, now) {
@@ -84,8 +116,8 @@ class Points {
   update(now) {
     while (this.dying.length && now - this.dying[0][0] > FADE_OUT_S) this.free.push(this.dying.shift()[1]);
     const geometry = this.object.geometry;
-    for (const name of ["position", "born", "died"]) geometry.attributes[name].needsUpdate = true;
-    geometry.setDrawRange(0, this.used);
+    for (const name in geometry.attributes) geometry.attributes[name].needsUpdate = true;
+    geometry.index.needsUpdate = true;
     const heights = [], step = Math.max(1, Math.floor(this.used / 500));
     for (let i = 0; i < this.used; i += step) if (this.arrays.died[i] < 0) heights.push(this.arrays.position[3 * i + 1]);
     heights.sort((a, b) => a - b);
@@ -125,10 +157,16 @@ function addFrustum(pose, local, coordinates) {
   }
 }
 
+// Whether the processor does the drawing; smooth edges then cost more than half of the time.
+function isDrawnInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl"), names = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  return Boolean(names) && /swiftshader|llvmpipe|software/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL));
+}
+
 class MapView {
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: !isDrawnInSoftware(), preserveDrawingBuffer: true});
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setClearColor(0x0d1117);
     this.scene = new THREE.Scene();
@@ -144,6 +182,7 @@ class MapView {
     this.edges = makeLines(this.world, COLOURS.edge, 0.45);
     this.keyframeLines = makeLines(this.world, COLOURS.keyframe, 0.9);
     this.pathLines = makeLines(this.world, COLOURS.path, 1);
+    this.otherLines = makeLines(this.world, COLOURS.other, 0.7);
     this.now = makeLines(this.world, COLOURS.tracking, 1);
     this.body = new THREE.Mesh(new THREE.BufferGeometry(),
                                new THREE.MeshBasicMaterial({color: COLOURS.tracking, transparent: true, opacity: 0.35, side: THREE.DoubleSide, depthWrite: false}));
@@ -166,7 +205,7 @@ class MapView {
     this.loops = [];
     this.pose = null;
     this.placed = false;
-    for (const lines of [this.edges, this.keyframeLines, this.pathLines, this.now]) setLines(lines, []);
+    for (const lines of [this.edges, this.keyframeLines, this.pathLines, this.otherLines, this.now]) setLines(lines, []);
     setLines(this.body, []);
     this.redraw();
   }
@@ -192,11 +231,13 @@ class MapView {
     const float = () => { at += 4; return view.getFloat32(at - 4, true); };
     if (isWhole) { this.points.clear(); this.keyframes.clear(); this.path = []; }
     const count = word(), isMuch = isWhole || count > 20000;
-    const ids = at;
+    const ids = at, parts = at + 16 * count;
     at += 4 * count;
     for (let i = 0; i < count; ++i) {
-      this.points.set(view.getUint32(ids + 4 * i, true), float(), float(), float(), isMuch ? now - FADE_IN_S : now);
+      this.points.set(view.getUint32(ids + 4 * i, true), view.getUint32(parts + 4 * i, true), float(), float(), float(),
+                      isMuch ? now - FADE_IN_S : now);
     }
+    at += 4 * count;
     for (let n = word(); n > 0; --n) this.points.remove(word(), now);
     for (let n = word(); n > 0; --n) {
       const id = word(), part = word(), pose = [float(), float(), float(), float(), float(), float(), float()], neighbours = [];
@@ -205,27 +246,31 @@ class MapView {
     }
     for (let n = word(); n > 0; --n) this.keyframes.delete(word());
     this.path.length = Math.min(this.path.length, word());
-    for (let n = word(); n > 0; --n) this.path.push([float(), float(), float(), word()]);
+    for (let n = word(); n > 0; --n) this.path.push([float(), float(), float(), word(), word()]);
+    this.points.material.uniforms.current.value = this.part = word();
     this.points.update(now);
     this.rebuild();
     this.redraw(FADE_OUT_S + 0.1);
   }
 
+  // Parts of the map have worlds of their own until a place joins them; all but the camera's are grey.
   rebuild() {
-    const frustums = [], edges = [], path = [], local = corners(this.camera, 0.045);
+    const frustums = [], edges = [], path = [], others = [], local = corners(this.camera, 0.045);
     for (const keyframe of this.keyframes.values()) {
-      addFrustum(keyframe.pose, local, frustums);
+      addFrustum(keyframe.pose, local, keyframe.part === this.part ? frustums : others);
       for (const id of keyframe.neighbours) {
         const other = this.keyframes.get(id);
-        if (other) edges.push(...keyframe.pose.slice(0, 3), ...other.pose.slice(0, 3));
+        if (other && keyframe.part === this.part) edges.push(...keyframe.pose.slice(0, 3), ...other.pose.slice(0, 3));
       }
     }
     for (let i = 1; i < this.path.length; ++i) {
-      if (this.path[i][3] === this.path[i - 1][3]) path.push(...this.path[i - 1].slice(0, 3), ...this.path[i].slice(0, 3));
+      const [from, to] = [this.path[i - 1], this.path[i]];
+      if (to[3] === from[3] && to[4] === from[4]) (to[4] === this.part ? path : others).push(...from.slice(0, 3), ...to.slice(0, 3));
     }
     setLines(this.keyframeLines, frustums);
     setLines(this.edges, edges);
     setLines(this.pathLines, path);
+    setLines(this.otherLines, others);
   }
 
   // The camera of the newest frame; without a pose it stays where it was last, in the colour of the state.
@@ -302,7 +347,14 @@ class MapView {
 
   draw() {
     const now = this.seconds();
-    if (!this.dirty && now > this.drawUntil) return;
+    if (this.hasDrawn) this.points.adapt(now - this.called);  // the browser calls late when drawing took long
+    this.called = now;
+    this.hasDrawn = false;
+    const isMoving = this.dirty || now < this.drawUntil;
+    if (isMoving) this.lastMove = now;
+    if (!isMoving && (this.isWhole || now < this.lastMove + STILL_S)) return;
+    this.isWhole = this.points.choose(!isMoving);
+    this.hasDrawn = isMoving;
     this.dirty = false;
     this.points.material.uniforms.now.value = now;
     for (const loop of this.loops) {
