@@ -1,7 +1,9 @@
 #include "cmd_run.h"
 
 #include <chrono>
+#include <exception>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -95,7 +97,8 @@ void CheckMapOptions(const RunArguments& arguments, const SystemOptions& options
 class Checkpoint {
  public:
   // every_min: 0: never.
-  Checkpoint(std::string file, double every_min) : file_(std::move(file)), every_min_(every_min) {}
+  Checkpoint(std::string file, double every_min, const RunConsole& console)
+      : console_(console), file_(std::move(file)), every_min_(every_min) {}
 
   void SaveIfDue(const SlamSystem& system) {
     const auto now = std::chrono::steady_clock::now();
@@ -110,11 +113,12 @@ class Checkpoint {
       }
       WriteFileAtomically(file_, bytes);
     } catch (const InputError& error) {
-      fmt::print(stderr, "warning: {}\n", error.what());
+      console_.Say(fmt::format("warning: {}", error.what()));
     }
   }
 
  private:
+  const RunConsole& console_;
   std::string file_;
   double every_min_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
@@ -143,6 +147,29 @@ std::optional<MetricScale> FindScale(const ScaleSource& source, const RunArgumen
     return std::nullopt;
   }
 }
+
+// Writes files each for itself: what cannot be written does not take the others along.
+class FileWriter {
+ public:
+  // Whether that was possible.
+  bool Try(const std::function<void()>& write) {
+    try {
+      write();
+      return true;
+    } catch (const std::exception&) {
+      if (failure_ == nullptr) failure_ = std::current_exception();
+      return false;
+    }
+  }
+
+  // Throws what the first of them threw, if any did.
+  void ThrowFailure() const {
+    if (failure_ != nullptr) std::rethrow_exception(failure_);
+  }
+
+ private:
+  std::exception_ptr failure_;
+};
 
 void RunSource(const RunArguments& arguments, int* exit_code) {
   TraceThreadName("main");
@@ -208,12 +235,14 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     load_map();
   };
   RunJournal journal(out);
-  Checkpoint checkpoint(arguments.save_map, arguments.save_map_every_min);
+  Checkpoint checkpoint(arguments.save_map, arguments.save_map_every_min, console);
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
     const Frame& frame = *progress.frame_in_work;
-    journal.Add(*progress.record, progress.map->Read()->PartOf(frame.reference),
-                frame.cam_from_world.Inverse());
+    if (!journal.Add(*progress.record, progress.map->Read()->PartOf(frame.reference),
+                     frame.cam_from_world.Inverse())) {
+      console.Say("warning: there is no more space for the journal: a run that is killed now loses the rest");
+    }
     checkpoint.SaveIfDue(system);
     recorder.Watch(progress);
     if (overlay.has_value()) overlay->Write(progress);
@@ -226,17 +255,22 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   if (scale_source.has_value()) summary.scale = FindScale(*scale_source, arguments, system);
-  WriteResults(out, system, summary);
-  journal.Remove();
-  if (!arguments.save_map.empty() && summary.failure == nullptr) {
-    WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
-  }
-  PrintSummary(summary);
+  FileWriter files;
+  const bool has_results = files.Try([&] { WriteResults(out, system, summary); });
+  if (has_results) journal.Remove();
+  const bool saves_map = !arguments.save_map.empty() && summary.failure == nullptr;
+  if (saves_map) files.Try([&] { WriteMapFile(arguments.save_map, system.camera(), *system.map().Read()); });
   if (arguments.truth.empty()) truth = FindTruth(arguments.source);
+  files.Try([&] {
+    WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
+  });
+  PrintSummary(summary);
   if (truth.has_value()) ReportTruth(*truth, system.FrameTrajectory(), out);
-  WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
   if (!arguments.trace.empty()) EndTrace(arguments.trace);
-  if (!arguments.save_map.empty() && summary.failure == nullptr) fmt::print("map: {}\n", arguments.save_map);
+  if (!has_results)
+    console.Say(fmt::format("Make space; dynamic_slam recover {} then writes the path.", out.string()));
+  if (summary.failure == nullptr) files.ThrowFailure();  // else that one is the cause
+  if (saves_map) fmt::print("map: {}\n", arguments.save_map);
   fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
   // After all results: a recording that cannot be written must not take them along.
   if (viewer.has_value()) viewer->Finish(system);

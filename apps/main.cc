@@ -1,13 +1,19 @@
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
+#include <new>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <opencv2/core.hpp>
 
 #include "cmd_bench.h"
 #include "cmd_calibrate.h"
@@ -34,6 +40,37 @@ namespace {
 constexpr int kExitBug = 1;
 constexpr int kExitInput = 2;
 
+// What the machine has run out of; "" when it is something else.
+std::string Exhausted(const std::exception& error) {
+  const auto* opencv = dynamic_cast<const cv::Exception*>(&error);
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+      (opencv != nullptr && opencv->code == cv::Error::StsNoMem)) {
+    return "memory: there is no more of it\n"
+           "  Allow the program more, or give it smaller images (image.resize_width) or fewer frames.";
+  }
+  // Of several types: TBB throws a plain runtime_error.
+  const std::string none_can_be_made = std::strerror(EAGAIN);
+  if (std::string(error.what()).find(none_can_be_made) != std::string::npos) {
+    return fmt::format("threads: none can be made ({})\n  Allow the program more memory or threads.",
+                       none_can_be_made);
+  }
+  return "";
+}
+
+// Whether all that was printed could be.
+bool IsOutputWhole() { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
+
+// Standard error may be closed too.
+void PrintError(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
+int ReportOutput(int error) {
+  PrintError(
+      fmt::format("error: standard output: cannot be written ({})\n"
+                  "  Give it a place with space, or a reader that stays.\n",
+                  std::strerror(error)));
+  return kExitInput;
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("Dynamic-SLAM: the path of one camera, and a map of what stands still around it",
                "dynamic_slam");
@@ -59,16 +96,22 @@ int Main(int argc, char** argv) {
     std::vector<std::string> arguments = dynamic_slam::WithViewerPort({argv + 1, argv + argc});
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(std::move(arguments));                   // runs the subcommand
-    return exit_code;
+    return IsOutputWhole() ? exit_code : ReportOutput(errno);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitInput;  // --help and --version end here with 0
   } catch (const dynamic_slam::InputError& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
+    PrintError(fmt::format("error: {}\n", error.what()));
     return kExitInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr,
-               "internal error: {}\n  This is a bug: please report it with the command that you gave.\n",
-               error.what());
+    const auto* system = dynamic_cast<const std::system_error*>(&error);
+    if (system != nullptr && std::ferror(stdout) != 0) return ReportOutput(system->code().value());
+    if (const std::string what = Exhausted(error); !what.empty()) {
+      PrintError(fmt::format("error: {}\n", what));
+      return kExitInput;
+    }
+    PrintError(
+        fmt::format("internal error: {}\n  This is a bug: please report it with the command that you gave.\n",
+                    error.what()));
     return kExitBug;
   }
 }
@@ -76,6 +119,8 @@ int Main(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Who reads what is printed may go away; results are for files.
+  std::signal(SIGPIPE, SIG_IGN);
   const int code = Main(argc, argv);
   if (dynamic_slam::Worker::AbandonedCount() > 0) {
     // A network that hangs still runs, and uses what destructors would take away.

@@ -106,7 +106,10 @@ std::string ManPage(const CLI::App& app) {
   page += ".SH EXIT STATUS\n";
   page += Item("0", "", "All went well.");
   page += Item("1", "", "A bug of the program.");
-  page += Item("2", "", "Something that was given is wrong; the message says what, and the remedy.");
+  page += Item(
+      "2", "",
+      "Something that was given is wrong, or the disk is full or the memory used up; the message says what, "
+      "and the remedy.");
   page += Item("130", "", "The run was interrupted; what was found until then is in the results.");
   return page;
 }

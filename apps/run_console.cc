@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdio>
 
 #include <fmt/core.h>
 #include <unistd.h>
@@ -20,6 +21,9 @@ void OnInterrupt(int signal) {
   interrupted = true;
   std::signal(signal, SIG_DFL);
 }
+
+// Whether or not anybody can read it.
+void PrintLine(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -42,7 +46,7 @@ RunConsole::~RunConsole() {
 bool RunConsole::ShouldStop() const { return interrupted; }
 
 void RunConsole::Say(const std::string& text) const {
-  fmt::print(stderr, "{}{}\n", overwrite_ ? "\r\033[K" : "", text);
+  PrintLine(fmt::format("{}{}\n", overwrite_ ? "\r\033[K" : "", text));
 }
 
 void RunConsole::Show(const RunProgress& progress) {
@@ -52,8 +56,8 @@ void RunConsole::Show(const RunProgress& progress) {
   last_state_ = tracking.state;
   if (changed) {
     End();
-    fmt::print(stderr, "frame {}: {}{}{}\n", progress.frame - 1, Name(tracking.state),
-               tracking.reason.empty() ? "" : ": ", tracking.reason);
+    PrintLine(fmt::format("frame {}: {}{}{}\n", progress.frame - 1, Name(tracking.state),
+                          tracking.reason.empty() ? "" : ": ", tracking.reason));
   }
   // A file gets a line every five seconds, a terminal five a second.
   if (SecondsSince(last_line_) < (overwrite_ ? 0.2 : 5.0)) return;
@@ -65,18 +69,19 @@ void RunConsole::Show(const RunProgress& progress) {
     landmarks = map->landmarks().size();
   }
   const std::string total = progress.frames_total > 0 ? fmt::format("/{}", progress.frames_total) : "";
-  fmt::print(stderr, "{}frame {}{}  {:.0f} frames/s  {}  {} inliers  {} keyframes  {} landmarks  {}{}",
-             overwrite_ ? "\r\033[K" : "", progress.frame, total,
-             static_cast<double>(progress.frame) / SecondsSince(start_), Name(tracking.state),
-             tracking.inliers, keyframes, landmarks,
-             tracking.state == TrackingState::kTracking ? "" : tracking.reason, overwrite_ ? "" : "\n");
+  PrintLine(fmt::format("{}frame {}{}  {:.0f} frames/s  {}  {} inliers  {} keyframes  {} landmarks  {}{}",
+                        overwrite_ ? "\r\033[K" : "", progress.frame, total,
+                        static_cast<double>(progress.frame) / SecondsSince(start_), Name(tracking.state),
+                        tracking.inliers, keyframes, landmarks,
+                        tracking.state == TrackingState::kTracking ? "" : tracking.reason,
+                        overwrite_ ? "" : "\n"));
   line_open_ = overwrite_;
   std::fflush(stderr);
 }
 
 void RunConsole::End() {
   if (!line_open_) return;
-  fmt::print(stderr, "\r\033[K");
+  PrintLine("\r\033[K");
   line_open_ = false;
 }
 

@@ -20,6 +20,16 @@ if(DYNAMIC_SLAM_SANITIZE)
   add_link_options(-fsanitize=${DYNAMIC_SLAM_SANITIZE})
 endif()
 
+# What hostile input finds first, and what makes a bug of ours harder to use. Sanitizers bring their own.
+option(DYNAMIC_SLAM_HARDEN "Guards of stacks and C functions, addresses that vary, tables that are read-only" ON)
+if(DYNAMIC_SLAM_HARDEN AND NOT DYNAMIC_SLAM_SANITIZE)
+  add_compile_options($<$<CONFIG:Release,RelWithDebInfo>:-U_FORTIFY_SOURCE> $<$<CONFIG:Release,RelWithDebInfo>:-D_FORTIFY_SOURCE=2>
+                      -fstack-protector-strong)
+  add_link_options(-Wl,-z,relro,-z,now)
+  include(CheckPIESupported)
+  check_pie_supported()
+endif()
+
 # ds_library(member SOURCES a.cc DEPS base Eigen3::Eigen TESTS a_test.cc)
 #
 # Makes the library dynamic_slam_<member>, linked to the members and the targets in DEPS, and, when there

@@ -12,7 +12,17 @@ namespace dynamic_slam {
 class DYNAMIC_SLAM_API InputError : public std::runtime_error {
  public:
   InputError(const std::string& what_is_wrong, const std::string& reason, const std::string& remedy)
-      : std::runtime_error(what_is_wrong + ": " + reason + (remedy.empty() ? "" : "\n  " + remedy)) {}
+      : std::runtime_error(
+            Printable(what_is_wrong + ": " + reason + (remedy.empty() ? "" : "\n  " + remedy))) {}
+
+ private:
+  // What is quoted of a file must neither end the message nor command a terminal.
+  static std::string Printable(std::string text) {
+    for (char& c : text) {
+      if ((c >= 0 && c < 0x20 && c != '\n' && c != '\t') || c == 0x7f) c = '?';
+    }
+    return text;
+  }
 };
 
 // A bug of ours: an invariant does not hold.

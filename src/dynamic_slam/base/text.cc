@@ -127,6 +127,7 @@ std::vector<TextLine> ReadDataLines(const std::filesystem::path& file) {
 }
 
 std::string ReadFile(const std::filesystem::path& file, const std::string& remedy) {
+  constexpr size_t kMaxUnannounced = 64 << 20;
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) {
     throw InputError(file.string(), "is a folder, a file is wanted", remedy);
@@ -141,6 +142,9 @@ std::string ReadFile(const std::filesystem::path& file, const std::string& remed
   const uintmax_t announced = std::filesystem::file_size(file, ignored);
   const size_t block = ignored ? 1 << 16 : std::max<size_t>(announced + 1, 1 << 16);
   for (size_t size = 0; stream;) {
+    if (ignored && size > kMaxUnannounced) {
+      throw InputError(file.string(), fmt::format("does not end within {} bytes", kMaxUnannounced), remedy);
+    }
     content.resize(size + block);
     stream.read(content.data() + size, static_cast<std::streamsize>(content.size() - size));
     size += static_cast<size_t>(stream.gcount());

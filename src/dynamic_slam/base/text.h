@@ -42,12 +42,12 @@ struct TextLine {
 // cannot be read.
 std::vector<TextLine> ReadDataLines(const std::filesystem::path& file);
 
-// The bytes of a file. Throws InputError when it cannot be read; `remedy` is the last sentence of the
-// message.
+// The bytes of a file; of a pipe or a device at most 64 MB. Throws InputError when it cannot be read;
+// `remedy` is the last sentence of the message.
 std::string ReadFile(const std::filesystem::path& file, const std::string& remedy = "");
 
-// Writes FILE.tmp to the disk and renames it to FILE, so that FILE is never half written, whenever the program
-// or the machine stops; makes the folder. Throws InputError.
+// Writes FILE.tmp to the disk and renames it to FILE, so that FILE is never half written, whenever the
+// program or the machine stops; makes the folder. Throws InputError.
 void WriteFileAtomically(const std::filesystem::path& file, std::string_view content);
 
 // Throws InputError when WriteFileAtomically would, as far as that can be known before; makes the folder.

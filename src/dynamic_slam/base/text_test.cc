@@ -75,6 +75,22 @@ TEST(ReadDataLines, SkipsCommentsAndBlanksAndCountsThem) {
   EXPECT_EQ(lines[1].text, "second");
 }
 
+TEST(InputError, QuotesNothingThatEndsItOrCommandsATerminal) {
+  const std::string quoted("a\0b\x1b[2Jc\xc3\xa9", 10);
+  EXPECT_STREQ(InputError("x:1", "'" + quoted + "' is no number", "Correct the line.").what(),
+               "x:1: 'a?b?[2Jc\xc3\xa9' is no number\n  Correct the line.");
+}
+
+TEST(ReadFile, WhatHasNoEndIsRefused) {
+  try {
+    ReadFile("/dev/zero", "Give a file.");
+    FAIL() << "it has no end";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("/dev/zero: does not end"));
+    EXPECT_THAT(e.what(), HasSubstr("Give a file."));
+  }
+}
+
 TEST(ReadFile, NamesTheFileAndTheReason) {
   const auto folder = TestFolder();
   try {

@@ -104,7 +104,7 @@ std::vector<BoxRecord> ReadBoxFile(const fs::path& file) {
 void WriteBoxFile(const fs::path& file, std::span<const BoxRecord> records) {
   std::string text = "timestamp,class,score,x,y,w,h\n";
   for (const BoxRecord& record : records) {
-    DS_CHECK(record.class_name.find_first_of(",\n#") == std::string::npos, "class {}", record.class_name);
+    DS_CHECK(record.class_name.find_first_of(",\n") == std::string::npos, "class {}", record.class_name);
     fmt::format_to(std::back_inserter(text), "{:.9f},{},{:.6f},{:.3f},{:.3f},{:.3f},{:.3f}\n",
                    record.timestamp_s, record.class_name, record.score, record.box.x, record.box.y,
                    record.box.width, record.box.height);

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/error.h"
-#include "dynamic_slam/base/text.h"
 #include "dynamic_slam/base/test_folder.h"
+#include "dynamic_slam/base/text.h"
 
 namespace dynamic_slam {
 namespace {
@@ -47,10 +47,12 @@ TEST_F(BoxFileTest, ReadsTruth) {
 
 TEST_F(BoxFileTest, WritesWhatItReads) {
   const std::vector<BoxRecord> records = {{1305031452.79172, "dining table", 0.125, 1, {1.5, -2, 30.25, 4}},
-                                          {1305031452.82, "person", 1, 1, {0, 0, 640, 480}}};
+                                          {1305031452.82, "person", 1, 1, {0, 0, 640, 480}},
+                                          {1305031453, "class #3", 1, 1, {0, 0, 640, 480}}};
   WriteBoxFile(file_, records);
   const auto read = ReadBoxFile(file_);
-  ASSERT_THAT(read, SizeIs(2));
+  ASSERT_THAT(read, SizeIs(3));
+  EXPECT_EQ(read[2].class_name, "class #3");
   EXPECT_EQ(read[0].class_name, "dining table");
   EXPECT_NEAR(read[0].timestamp_s, 1305031452.79172, 1e-6);
   EXPECT_EQ(read[0].score, 0.125);

@@ -77,9 +77,9 @@ TEST(FaultInjection, WithoutFaultsNothingChanges) {
 
 TEST(FaultInjection, AShareOfTheFramesIsDroppedByTheSeed) {
   const auto names = [](const Seen& seen) {
-    std::set<std::string> names;
-    for (const SourceProblem& problem : seen.problems) names.insert(problem.name);
-    return names;
+    std::set<std::string> all;
+    for (const SourceProblem& problem : seen.problems) all.insert(problem.name);
+    return all;
   };
   const Seen seen = See("drop=0.1");
   EXPECT_NEAR(static_cast<double>(seen.problems.size()), 0.1 * kFrames, 30);  // three standard deviations

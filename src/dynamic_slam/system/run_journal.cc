@@ -27,8 +27,8 @@ RunJournal::RunJournal(std::filesystem::path folder) : file_(std::move(folder) /
   if (!stream_) throw InputError(file_.string(), "cannot be written", "Choose another folder with --out.");
 }
 
-void RunJournal::Add(const RunSummary::FrameRecord& record, PartId part, const Rigid3& world_from_cam) {
-  if (!stream_) return;
+bool RunJournal::Add(const RunSummary::FrameRecord& record, PartId part, const Rigid3& world_from_cam) {
+  if (!stream_) return true;
   stream_ << (record.map_was_erased ? "1," : "0,");
   if (record.state == TrackingState::kTracking && part.IsValid()) {
     const Eigen::Vector3d& t = world_from_cam.translation;
@@ -40,6 +40,7 @@ void RunJournal::Add(const RunSummary::FrameRecord& record, PartId part, const R
   }
   // To the system, where it is safe from all but a loss of power.
   stream_ << FramesCsvRow(record) << std::flush;
+  return static_cast<bool>(stream_);
 }
 
 void RunJournal::Remove() {

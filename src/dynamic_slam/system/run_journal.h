@@ -20,8 +20,9 @@ class RunJournal {
   // Throws InputError when the file cannot be written.
   explicit RunJournal(std::filesystem::path folder);
 
-  // part, world_from_cam: of a frame that has a pose. A disk that is full ends the journal, not the run.
-  void Add(const RunSummary::FrameRecord& record, PartId part, const Rigid3& world_from_cam);
+  // part, world_from_cam: of a frame that has a pose. A disk that is full ends the journal, not the run:
+  // false, once.
+  bool Add(const RunSummary::FrameRecord& record, PartId part, const Rigid3& world_from_cam);
 
   // The results are written: nothing is left to recover.
   void Remove();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -9,6 +10,18 @@ namespace dynamic_slam {
 
 using HttpRequest = boost::beast::http::request<boost::beast::http::string_body>;
 using HttpResponse = boost::beast::http::response<boost::beast::http::string_body>;
+
+// Reads one request, of bounded size.
+class HttpRequestParser : public boost::beast::http::request_parser<boost::beast::http::string_body> {
+ public:
+  static constexpr uint32_t kMaxHeaderBytes = 8192;
+  static constexpr uint64_t kMaxBodyBytes = 1024;
+
+  HttpRequestParser() {
+    header_limit(kMaxHeaderBytes);
+    body_limit(kMaxBodyBytes);
+  }
+};
 
 // The word in the query "...?token=WORD"; "" without one.
 std::string_view TokenOf(std::string_view target);

@@ -1,5 +1,6 @@
 #include "dynamic_slam/viewer/recording.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -78,6 +79,20 @@ Message RecordingReader::Read(size_t entry) {
   stream_.read(bytes.data(), e.bytes);
   if (!stream_) throw InputError(name_, "cannot be read any more", "Was it changed meanwhile?");
   return std::make_shared<const std::string>(std::move(bytes));
+}
+
+nlohmann::json RecordingReader::Hello() {
+  const Message told = Read(0);
+  // As MessageWriter::AddJson wrote it.
+  const size_t start = std::min(told->size(), kMessageHeaderBytes + sizeof(uint32_t));
+  // Whoever copies or writes JSON goes down into it: what is nested deeper than we do is left out.
+  const auto is_shallow = [](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
+    constexpr int kMaxDepth = 16;
+    return depth <= kMaxDepth;
+  };
+  const nlohmann::json hello =
+      nlohmann::json::parse(told->begin() + static_cast<ptrdiff_t>(start), told->end(), is_shallow, false);
+  return hello.is_object() ? hello : nlohmann::json::object();
 }
 
 }  // namespace dynamic_slam

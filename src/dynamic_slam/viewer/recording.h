@@ -43,6 +43,9 @@ class RecordingReader {
 
   Message Read(size_t entry);
 
+  // What is run, as the first message tells it; an empty object when that is none.
+  nlohmann::json Hello();
+
  private:
   std::string name_;
   std::ifstream stream_;

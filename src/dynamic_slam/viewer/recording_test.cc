@@ -48,5 +48,24 @@ TEST_F(RecordingTest, WhereverItEndsTheFramesBeforeAreThere) {
   EXPECT_EQ(most, 0u);
 }
 
+TEST_F(RecordingTest, AHelloThatIsNoneOrHasNoEndOfDepthsIsEmpty) {
+  const auto hello_of = [this](const std::string& json) {
+    const std::filesystem::path file = folder_ / kRecordingName;
+    {
+      RecordingWriter writer(file);
+      MessageWriter hello({MessageType::kHello, 0, 0});
+      hello.AddBytes(json);
+      writer.Add(0, hello.Finish());
+      writer.Add(0, Frame(0));
+    }
+    return RecordingReader(file).Hello();
+  };
+  EXPECT_EQ(hello_of(R"({"source": "here", "names": {"a": [1]}})").dump(),
+            R"({"names":{"a":[1]},"source":"here"})");
+  for (const char* json : {"", "[1]", "{", "1"}) EXPECT_EQ(hello_of(json), nlohmann::json::object()) << json;
+  const std::string open(200'000, '['), close(200'000, ']');
+  EXPECT_LT(hello_of(R"({"a": )" + open + close + "}").dump().size(), 100u);
+}
+
 }  // namespace
 }  // namespace dynamic_slam

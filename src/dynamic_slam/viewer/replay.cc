@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "dynamic_slam/base/text.h"
+#include "dynamic_slam/viewer/player_command.h"
 
 namespace dynamic_slam {
 namespace {
@@ -20,12 +20,7 @@ Replay::Replay(const std::filesystem::path& file, const ServerOptions& options)
 }
 
 Message Replay::Hello() {
-  const Message told = recording_.Read(0);
-  // As MessageWriter::AddJson wrote it; what is no JSON becomes nothing.
-  const size_t start = std::min(told->size(), kMessageHeaderBytes + sizeof(uint32_t));
-  nlohmann::json hello =
-      nlohmann::json::parse(told->begin() + static_cast<ptrdiff_t>(start), told->end(), nullptr, false);
-  if (!hello.is_object()) hello = nlohmann::json::object();
+  nlohmann::json hello = recording_.Hello();
   hello["mode"] = "replay";
   nlohmann::json& states = hello["states"] = nlohmann::json::array();
   for (const size_t frame : recording_.frames()) states.push_back(recording_.entries()[frame].header.detail);
@@ -87,24 +82,28 @@ void Replay::PlayOn() {
   });
 }
 
-void Replay::OnCommand(std::string_view command) {
-  const size_t space = std::min(command.size(), command.find(' '));
-  const std::string_view word = command.substr(0, space);
-  const std::optional<double> number = ParseDouble(command.substr(std::min(command.size(), space + 1)));
-  if (word == "pause" || word == "resume") {
-    is_playing_ = word == "resume";
-    if (is_playing_ && position_ + 1 == recording_.frames().size()) SeekTo(0);
-    server_.Broadcast(Player());
-  } else if (word == "step") {
-    is_playing_ = false;
-    Advance();
-  } else if (word == "seek" && number.has_value() && *number >= 0 && *number < 1e9) {
-    SeekTo(static_cast<size_t>(*number));
-  } else if (word == "speed" && number.has_value() && *number >= 0.1 && *number <= 20) {
-    speed_ = *number;
-    server_.Broadcast(Player());
-  } else {
-    return;
+void Replay::OnCommand(std::string_view text) {
+  using Kind = PlayerCommand::Kind;
+  const std::optional<PlayerCommand> command = ParsePlayerCommand(text);
+  if (!command.has_value()) return;
+  switch (command->kind) {
+    case Kind::kPause:
+    case Kind::kResume:
+      is_playing_ = command->kind == Kind::kResume;
+      if (is_playing_ && position_ + 1 == recording_.frames().size()) SeekTo(0);
+      server_.Broadcast(Player());
+      break;
+    case Kind::kStep:
+      is_playing_ = false;
+      Advance();
+      break;
+    case Kind::kSeek:
+      SeekTo(static_cast<size_t>(command->number));
+      break;
+    case Kind::kSpeed:
+      speed_ = command->number;
+      server_.Broadcast(Player());
+      break;
   }
   ++turn_;
   PlayOn();

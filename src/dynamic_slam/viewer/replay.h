@@ -19,7 +19,7 @@ class Replay : private Show {
 
  private:
   std::vector<Message> Backlog() override;
-  void OnCommand(std::string_view command) override;
+  void OnCommand(std::string_view text) override;
 
   Message Hello();
   Message Player() const;

@@ -29,8 +29,6 @@ using tcp = asio::ip::tcp;
 // Bounds on what anybody can make us do.
 constexpr int kMaxConnections = 64;           // of all kinds, at a time
 constexpr size_t kMaxBrowsers = 16;           // of these, with a WebSocket
-constexpr uint32_t kMaxHeaderBytes = 8192;    // of a request
-constexpr uint64_t kMaxBodyBytes = 1024;      // of a request
 constexpr size_t kMaxCommandBytes = 256;      // of a message over the WebSocket
 constexpr std::chrono::seconds kPatience(5);  // for a request or an answer
 constexpr std::chrono::seconds kSilence(30);  // of a browser, which answers pings
@@ -244,8 +242,6 @@ class ViewerServer::Impl {
 
     void Read() {
       parser_.emplace();
-      parser_->header_limit(kMaxHeaderBytes);
-      parser_->body_limit(kMaxBodyBytes);
       stream_.expires_after(kPatience);  // for the whole request, however slowly it drips
       http::async_read(stream_, buffer_, *parser_,
                        [self = shared_from_this()](const error_code& error, size_t) {
@@ -287,8 +283,8 @@ class ViewerServer::Impl {
     Impl* server_;
     beast::tcp_stream stream_;
     std::unique_ptr<Place> place_;
-    beast::flat_buffer buffer_{kMaxHeaderBytes + kMaxBodyBytes};
-    std::optional<http::request_parser<http::string_body>> parser_;
+    beast::flat_buffer buffer_{HttpRequestParser::kMaxHeaderBytes + HttpRequestParser::kMaxBodyBytes};
+    std::optional<HttpRequestParser> parser_;
     HttpResponse response_;
   };
 
