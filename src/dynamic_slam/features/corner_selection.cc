@@ -4,8 +4,18 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 namespace dynamic_slam {
+namespace {
+
+// Levels take turns with the buffers, so these keep the size of the largest, and grow by half of it at least.
+template <class T>
+void GrowTo(size_t size, std::vector<T>* buffer) {
+  if (buffer->size() < size) buffer->resize(std::max(size, buffer->size() + buffer->size() / 2));
+}
+
+}  // namespace
 
 void ShareOverLevels(int wanted, const std::vector<double>& weights, const std::vector<int>& available,
                      std::vector<int>* shares) {
@@ -48,16 +58,19 @@ void CornerSelector::Select(int width, int height, int wanted, int weak_score, s
   std::array<uint32_t, 257> begin{};
   for (const Corner& corner : *corners) ++begin[255 - corner.score + 1];
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  by_score_.resize(count);
+  GrowTo(count, &by_score_);
   for (size_t i = 0; i < count; ++i) by_score_[begin[255 - (*corners)[i].score]++] = static_cast<uint32_t>(i);
 
   const double cell_px = std::max(4.0, std::sqrt(static_cast<double>(width) * height / wanted));
   const float per_px = static_cast<float>(1 / cell_px);
   const int columns = static_cast<int>(width * per_px) + 1, rows = static_cast<int>(height * per_px) + 1;
-  in_cell_.assign(static_cast<size_t>(columns) * rows, 0);
+  const size_t cells = static_cast<size_t>(columns) * rows;
+  GrowTo(cells, &in_cell_);
+  std::fill_n(in_cell_.begin(), cells, uint16_t{0});
   in_round_.assign(kRounds, 0);
-  round_.resize(count);
-  for (const uint32_t index : by_score_) {
+  GrowTo(count, &round_);
+  const std::span strongest_first(by_score_.data(), count);
+  for (const uint32_t index : strongest_first) {
     const Corner& corner = (*corners)[index];
     const int cell = static_cast<int>(corner.y * per_px) * columns + static_cast<int>(corner.x * per_px);
     const int late = corner.score <= weak_score ? 1 : 0;
@@ -68,7 +81,7 @@ void CornerSelector::Select(int width, int height, int wanted, int weak_score, s
   int last_round = 0, left = wanted;  // left: places for corners of the last round
   while (left > static_cast<int>(in_round_[last_round])) left -= static_cast<int>(in_round_[last_round++]);
   constexpr uint16_t kDropped = UINT16_MAX;
-  for (const uint32_t index : by_score_) {
+  for (const uint32_t index : strongest_first) {
     if (round_[index] < last_round) continue;
     if (round_[index] > last_round || left-- <= 0) round_[index] = kDropped;
   }
