@@ -166,6 +166,30 @@ TEST_F(LittleCoverageTest, TooFewViewsAreCounted) {
   }
 }
 
+// Views whose tilts hardly tell decentring from a shifted centre: solved for, it moved the centre by three
+// pixels.
+TEST(DecentringTest, IsLeftOutWhereItIsNotCertain) {
+  Camera truth;
+  truth.width = 640;
+  truth.height = 480;
+  truth.fx = truth.fy = 535.4;
+  truth.cx = 320;
+  truth.cy = 240;
+  std::vector<Rigid3> poses;
+  for (const double v : {0.24, 0.5, 0.76}) {
+    for (const double u : {0.2, 0.5, 0.8}) {
+      const double turn_x = v < 0.4 ? -30 : v > 0.6 ? 30 : 0, turn_y = u < 0.4 ? 35 : u > 0.6 ? -35 : 25;
+      poses.push_back(Pose(truth, u, v, 0.27, 0, 0, 3));
+      poses.push_back(Pose(truth, u, v, 0.27, turn_x, turn_y, -10));
+      poses.push_back(Pose(truth, u, v, 0.27, -turn_x, -turn_y, 80));
+    }
+  }
+  const Camera camera = CalibrateBoard(Film(truth, poses), kBoard, truth.model).camera;
+  EXPECT_NEAR(camera.fx / truth.fx, 1, 0.002);
+  EXPECT_NEAR(camera.cx, truth.cx, 1);
+  EXPECT_NEAR(camera.cy, truth.cy, 1);
+}
+
 TEST(BoardCoverageTest, AnEmptyPictureIsRed) {
   const BoardCoverage coverage({}, cv::Size(60, 40));
   EXPECT_EQ(coverage.Share(), 0);
