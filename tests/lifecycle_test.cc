@@ -152,6 +152,7 @@ TEST_P(LifecycleTest, AfterAResetItIsAsNew) {
   EXPECT_THAT(system_->mapping_report().times_ms, IsEmpty());
   EXPECT_EQ(system_->map().Read()->keyframes().size(), 0u);
   EXPECT_EQ(Process(0).id, FrameId(0));
+  EXPECT_FALSE(system_->map().Read()->PartOf(system_->frame().reference).IsValid());
   system_->Stop();
   system_->Reset();
   Play(kFrames);

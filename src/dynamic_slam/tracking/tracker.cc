@@ -234,6 +234,7 @@ void Tracker::ForgetPose() {
 void Tracker::Reset() {
   map_->Write()->Reset();
   ForgetPose();
+  frame_.reference = last_.reference = KeyframeId();  // those of the map that is gone
   initializer_.Reset();
   filter_.Reset();
   share_in_boxes_ = 0;
