@@ -20,8 +20,9 @@ Box Core(const Box& box) {
 }
 
 // Which points start inside the box, in order. Without branches: where points are is hard to predict.
-std::vector<size_t> PointsIn(const Box& box, std::span<const PointMotion> motions) {
-  std::vector<size_t> inside(motions.size());
+void FindPointsIn(const Box& box, std::span<const PointMotion> motions, std::vector<size_t>* result) {
+  std::vector<size_t>& inside = *result;
+  inside.resize(motions.size());
   const double right = box.x + box.width, bottom = box.y + box.height;
   size_t count = 0;
   for (size_t m = 0; m < motions.size(); ++m) {
@@ -30,7 +31,6 @@ std::vector<size_t> PointsIn(const Box& box, std::span<const PointMotion> motion
     count += static_cast<size_t>((x >= box.x) & (y >= box.y) & (x < right) & (y < bottom));
   }
   inside.resize(count);
-  return inside;
 }
 
 }  // namespace
@@ -41,52 +41,59 @@ double Median(std::vector<double>* values) {
   return *middle;
 }
 
-std::vector<std::vector<PointMotion>> ShareMotions(std::span<const Box> boxes,
-                                                   std::span<const Eigen::Vector2d> expected_px,
-                                                   std::span<const PointMotion> motions) {
-  std::vector<std::vector<PointMotion>> shares(boxes.size());
+std::span<const std::optional<BoxMotion>> BoxMotionEstimator::Estimate(
+    std::span<const Box> boxes, std::span<const Eigen::Vector2d> expected_px,
+    std::span<const PointMotion> motions) {
+  estimates_.clear();
   for (size_t i = 0; i < boxes.size(); ++i) {
-    std::vector<size_t> rivals;
-    for (size_t k = 0; k < boxes.size(); ++k) {
-      if (k != i && IntersectionArea(boxes[i], boxes[k]) > 0) rivals.push_back(k);
-    }
-    for (const size_t m : PointsIn(Core(boxes[i]), motions)) {
-      const PointMotion& motion = motions[m];
-      if (!motion.to_px.allFinite()) continue;
-      const auto misfit_px = [&](size_t k) {
-        return (motion.to_px - motion.from_px - expected_px[k]).norm();
-      };
-      const bool fits = std::none_of(rivals.begin(), rivals.end(), [&](size_t k) {
-        return boxes[k].Contains(motion.from_px.x(), motion.from_px.y()) &&
-               misfit_px(k) + kMotionNoise_px < misfit_px(i);
-      });
-      if (fits) shares[i].push_back(motion);
-    }
+    CollectPoints(i, boxes, expected_px, motions);
+    estimates_.push_back(MotionOf(boxes[i]));
   }
-  return shares;
+  return estimates_;
 }
 
-std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> inside) {
-  if (inside.size() < kMinPoints) return std::nullopt;
+void BoxMotionEstimator::CollectPoints(size_t box, std::span<const Box> boxes,
+                                       std::span<const Eigen::Vector2d> expected_px,
+                                       std::span<const PointMotion> motions) {
+  points_.clear();
+  rivals_.clear();
+  for (size_t k = 0; k < boxes.size(); ++k) {
+    if (k != box && IntersectionArea(boxes[box], boxes[k]) > 0) rivals_.push_back(k);
+  }
+  FindPointsIn(Core(boxes[box]), motions, &inside_);
+  for (const size_t m : inside_) {
+    const PointMotion& motion = motions[m];
+    if (!motion.to_px.allFinite()) continue;
+    const auto misfit_px = [&](size_t k) { return (motion.to_px - motion.from_px - expected_px[k]).norm(); };
+    const bool fits = std::none_of(rivals_.begin(), rivals_.end(), [&](size_t k) {
+      return boxes[k].Contains(motion.from_px.x(), motion.from_px.y()) &&
+             misfit_px(k) + kMotionNoise_px < misfit_px(box);
+    });
+    if (fits) points_.push_back(motion);
+  }
+}
 
-  std::vector<double> dx, dy, ratios;
-  for (std::vector<double>* values : {&dx, &dy, &ratios}) values->reserve(inside.size());
+std::optional<BoxMotion> BoxMotionEstimator::MotionOf(const Box& box) {
+  if (points_.size() < kMinPoints) return std::nullopt;
+  for (std::vector<double>* values : {&dx_, &dy_, &ratios_}) values->clear();
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (const PointMotion& motion : inside) {
-    dx.push_back(motion.to_px.x() - motion.from_px.x());
-    dy.push_back(motion.to_px.y() - motion.from_px.y());
+  for (const PointMotion& motion : points_) {
+    dx_.push_back(motion.to_px.x() - motion.from_px.x());
+    dy_.push_back(motion.to_px.y() - motion.from_px.y());
     mean += motion.from_px;
   }
-  mean /= static_cast<double>(inside.size());
+  mean /= static_cast<double>(points_.size());
   // Distances between points that are far apart grow with the object. One partner each bounds the time.
-  for (size_t i = 0; i < inside.size(); ++i) {
-    const PointMotion& a = inside[i];
-    const PointMotion& b = inside[(i + inside.size() / 2) % inside.size()];
+  for (size_t i = 0; i < points_.size(); ++i) {
+    const PointMotion& a = points_[i];
+    const PointMotion& b = points_[(i + points_.size() / 2) % points_.size()];
     const double before = (a.from_px - b.from_px).norm();
-    if (before > 0.2 * box.height) ratios.push_back((a.to_px - b.to_px).norm() / before);
+    if (before > 0.2 * box.height) ratios_.push_back((a.to_px - b.to_px).norm() / before);
   }
-  BoxMotion motion{{Median(&dx), Median(&dy)}, 1};
-  if (ratios.size() >= kMinRatios) motion.scale = std::clamp(Median(&ratios), 1 / kMaxGrowth, kMaxGrowth);
+  BoxMotion motion{{Median(&dx_), Median(&dy_)}, 1};
+  if (ratios_.size() >= kMinRatios) {
+    motion.scale = std::clamp(Median(&ratios_), 1 / kMaxGrowth, kMaxGrowth);
+  }
   // The median shift is that of the points' middle, which need not be the box's.
   motion.shift_px += (motion.scale - 1) * (Eigen::Vector2d(box.CenterX(), box.CenterY()) - mean);
   return motion;

@@ -24,15 +24,26 @@ struct BoxMotion {
 // The value in the middle; not empty, and their order is lost.
 double Median(std::vector<double>* values);
 
-// The points in the middle of each box. One in the middle of several goes to those whose expected shift (px)
-// it fits: so boxes of objects that cross keep each its own motion, and none follows the points in front of
-// it.
-std::vector<std::vector<PointMotion>> ShareMotions(std::span<const Box> boxes,
-                                                   std::span<const Eigen::Vector2d> expected_px,
-                                                   std::span<const PointMotion> motions);
+// How boxes moved, each by the points in its middle. Keeps its buffers from call to call.
+class BoxMotionEstimator {
+ public:
+  // For each box the motion of the object that fills most of it: medians, which bear that almost half of the
+  // points belong to something else; nothing when there are too few. A point in the middle of several boxes
+  // speaks for those whose expected shift (px) it fits: so boxes of objects that cross keep each its own
+  // motion, and none follows the points in front of it. Valid until the next call.
+  std::span<const std::optional<BoxMotion>> Estimate(std::span<const Box> boxes,
+                                                     std::span<const Eigen::Vector2d> expected_px,
+                                                     std::span<const PointMotion> motions);
 
-// The motion of the object that fills most of the box, from the points in its middle: medians, which bear
-// that almost half of them belong to something else. Nothing when there are too few points.
-std::optional<BoxMotion> MotionOfBox(const Box& box, std::span<const PointMotion> inside);
+ private:
+  void CollectPoints(size_t box, std::span<const Box> boxes, std::span<const Eigen::Vector2d> expected_px,
+                     std::span<const PointMotion> motions);
+  std::optional<BoxMotion> MotionOf(const Box& box);
+
+  std::vector<std::optional<BoxMotion>> estimates_;
+  std::vector<size_t> inside_, rivals_;
+  std::vector<PointMotion> points_;  // of the box in hand
+  std::vector<double> dx_, dy_, ratios_;
+};
 
 }  // namespace dynamic_slam

@@ -1,6 +1,8 @@
 #include "dynamic_slam/semantics/point_motion.h"
 
+#include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -23,53 +25,76 @@ std::vector<PointMotion> Points(const Eigen::Vector2d& shift, double scale) {
   return motions;
 }
 
-TEST(MotionOfBox, FindsShiftAndScale) {
-  const auto motion = MotionOfBox(kBox, Points({6, -4}, 1.04));
+std::vector<std::optional<BoxMotion>> Estimate(const std::vector<Box>& boxes,
+                                               const std::vector<Eigen::Vector2d>& expected_px,
+                                               const std::vector<PointMotion>& motions) {
+  BoxMotionEstimator estimator;
+  const auto estimates = estimator.Estimate(boxes, expected_px, motions);
+  return {estimates.begin(), estimates.end()};
+}
+
+const std::vector<Eigen::Vector2d> kStill = {Eigen::Vector2d::Zero()};
+
+TEST(BoxMotionEstimator, FindsShiftAndScale) {
+  const auto motion = Estimate({kBox}, kStill, Points({6, -4}, 1.04))[0];
   ASSERT_TRUE(motion);
   EXPECT_NEAR(motion->scale, 1.04, 1e-9);
   EXPECT_NEAR(motion->shift_px.x(), 6, 0.3);
   EXPECT_NEAR(motion->shift_px.y(), -4, 0.3);
 }
 
-TEST(MotionOfBox, BearsPointsOfTheBackground) {
+TEST(BoxMotionEstimator, BearsPointsOfTheBackground) {
   std::vector<PointMotion> motions = Points({6, -4}, 1);
   for (size_t i = 0; i < motions.size(); ++i) {
     if (i % 5 < 2) motions[i].to_px = motions[i].from_px + Eigen::Vector2d(-9, 9);
   }
-  const auto motion = MotionOfBox(kBox, motions);
+  const auto motion = Estimate({kBox}, kStill, motions)[0];
   ASSERT_TRUE(motion);
   EXPECT_NEAR(motion->shift_px.x(), 6, 1);
   EXPECT_NEAR(motion->shift_px.y(), -4, 1);
 }
 
-TEST(MotionOfBox, NeedsPointsInsideTheBox) { EXPECT_FALSE(MotionOfBox(kBox, {})); }
+TEST(BoxMotionEstimator, NeedsPointsInsideTheBox) { EXPECT_FALSE(Estimate({kBox}, kStill, {})[0]); }
 
-TEST(ShareMotions, GivesABoxThePointsInItsMiddle) {
-  const std::vector<Box> boxes = {kBox, {300, 100, 100, 200}};
-  const std::vector<Eigen::Vector2d> expected(2, Eigen::Vector2d::Zero());
-  const auto shares = ShareMotions(boxes, expected, Points({6, -4}, 1));
-  ASSERT_EQ(shares.size(), 2u);
-  EXPECT_EQ(shares[0].size(), 100u);  // columns 125 to 165 ...
-  EXPECT_TRUE(shares[1].empty());
+TEST(BoxMotionEstimator, ABoxMovesAsThePointsInItsMiddle) {
+  // At its sides, columns up to 125 and from 175, something else moves.
+  std::vector<PointMotion> motions = Points({6, -4}, 1);
+  for (PointMotion& motion : motions) {
+    if (std::abs(motion.from_px.x() - 150) > 25) motion.to_px = motion.from_px + Eigen::Vector2d(50, 50);
+  }
+  const auto found = Estimate({kBox, {300, 100, 100, 200}}, {2, Eigen::Vector2d::Zero()}, motions);
+  ASSERT_EQ(found.size(), 2u);
+  ASSERT_TRUE(found[0]);
+  EXPECT_NEAR(found[0]->shift_px.x(), 6, 1e-9);
+  EXPECT_NEAR(found[0]->shift_px.y(), -4, 1e-9);
+  EXPECT_FALSE(found[1]);
 }
 
-TEST(ShareMotions, APointInTwoBoxesIsOfTheOneWhoseMotionItFits) {
+TEST(BoxMotionEstimator, APointInTwoBoxesIsOfTheOneWhoseMotionItFits) {
   // The second box covers the first one's middle.
   const std::vector<Box> boxes = {kBox, {60, 100, 150, 200}};
   const auto points = Points({6, -4}, 1);
-  auto shares = ShareMotions(boxes, std::vector<Eigen::Vector2d>{{0, 0}, {7, -4}}, points);
-  EXPECT_TRUE(shares[0].empty());
-  EXPECT_FALSE(shares[1].empty());
+  auto found = Estimate(boxes, {{0, 0}, {7, -4}}, points);
+  EXPECT_FALSE(found[0]);
+  EXPECT_TRUE(found[1]);
   // Both move alike: the points say something of both.
-  shares = ShareMotions(boxes, std::vector<Eigen::Vector2d>{{6, -4}, {6.5, -4}}, points);
-  EXPECT_FALSE(shares[0].empty());
-  EXPECT_FALSE(shares[1].empty());
+  found = Estimate(boxes, {{6, -4}, {6.5, -4}}, points);
+  EXPECT_TRUE(found[0]);
+  EXPECT_TRUE(found[1]);
 }
 
-TEST(ShareMotions, SkipsPointsThatAreNowhere) {
+TEST(BoxMotionEstimator, SkipsPointsThatAreNowhere) {
   auto points = Points({6, -4}, 1);
   for (PointMotion& point : points) point.to_px.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(ShareMotions(std::vector{kBox}, std::vector{Eigen::Vector2d(6, -4)}, points)[0].empty());
+  EXPECT_FALSE(Estimate({kBox}, {{6, -4}}, points)[0]);
+}
+
+TEST(BoxMotionEstimator, NothingOfACallReachesTheNext) {
+  BoxMotionEstimator estimator;
+  const std::vector<Box> boxes = {kBox};
+  estimator.Estimate(boxes, kStill, Points({6, -4}, 1));
+  EXPECT_FALSE(estimator.Estimate(boxes, kStill, {})[0]);
+  EXPECT_NEAR(estimator.Estimate(boxes, kStill, Points({-3, 2}, 1))[0]->shift_px.x(), -3, 1e-9);
 }
 
 }  // namespace

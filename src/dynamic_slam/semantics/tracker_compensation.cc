@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "dynamic_slam/geometry/chi2.h"
 #include "dynamic_slam/semantics/assignment.h"
@@ -173,11 +174,13 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
     turns.push_back(camera);
     expected_px.push_back(camera.shift_px + step_s * track.filter.velocity_px_s());
   }
-  const std::vector<std::vector<PointMotion>> shares = ShareMotions(boxes, expected_px, input.motions);
+  BoxMotionEstimator estimator;
+  const std::span<const std::optional<BoxMotion>> seen =
+      estimator.Estimate(boxes, expected_px, input.motions);
   for (size_t t = 0; t < boxes.size(); ++t) {
     BoxFilter& filter = state->tracks[t].filter;
-    if (const std::optional<BoxMotion> seen = MotionOfBox(boxes[t], shares[t])) {
-      filter.Follow(options_.filter, step_s, seen->shift_px, seen->scale, turns[t].shift_px);
+    if (seen[t]) {
+      filter.Follow(options_.filter, step_s, seen[t]->shift_px, seen[t]->scale, turns[t].shift_px);
     } else {
       filter.Predict(options_.filter, step_s);
       filter.Move(turns[t].shift_px, turns[t].jacobian);

@@ -82,7 +82,7 @@ struct TrackerState {
 //   a result says nothing against an object.
 // - An object behind another one is still there: not to see it takes hidden_evidence only. The two must have
 //   been seen beside each other, else they may be one object with two boxes.
-// - Where boxes overlap, each point that is followed speaks for the box whose motion it fits (ShareMotions):
+// - Where boxes overlap, each point that is followed speaks for the box whose motion it fits (BoxMotionEstimator):
 // an
 //   object behind another one moves on with its own velocity.
 // - An object out of view is remembered while its evidence lasts, as the camera may turn back.

@@ -87,13 +87,7 @@ bool DynamicFilter::IsHidden(const Eigen::Vector2d& ideal_px) const {
 void DynamicFilter::Reset() {
   objects_.clear();
   last_objects_.clear();
-  object_log_odds_.clear();
-}
-
-std::vector<Box> DynamicFilter::Boxes() const {
-  std::vector<Box> boxes;
-  for (const Object& object : objects_) boxes.push_back(object.box.box);
-  return boxes;
+  boxes_.clear();
 }
 
 bool DynamicFilter::OnlyBoxesMove(std::span<const PointMotion> motions) const {
@@ -123,19 +117,19 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   const bool weights = options_.method == "weights";
   last_objects_.swap(objects_);
   objects_.clear();
+  boxes_.clear();
   if (options_.method != "none") {
     for (const DynamicBox& box : boxes) {
       if (!box.is_dynamic) continue;
       const double p = std::min(box.probability, kMostProbability);
-      const auto odds = object_log_odds_.find(box.track_id);
-      const double motion = odds == object_log_odds_.end() ? 0 : odds->second;
-      objects_.push_back({box, weights ? Sigmoid(std::log(p / (1 - p)) + motion) : 1});
+      const auto before = std::find_if(last_objects_.begin(), last_objects_.end(), [&](const Object& object) {
+        return object.box.track_id == box.track_id;
+      });
+      const double motion = before == last_objects_.end() ? 0 : before->motion_log_odds;
+      objects_.push_back({box, weights ? Sigmoid(std::log(p / (1 - p)) + motion) : 1, motion});
+      boxes_.push_back(box.box);
     }
   }
-  std::erase_if(object_log_odds_, [this](const auto& item) {
-    return std::none_of(objects_.begin(), objects_.end(),
-                        [&](const Object& object) { return object.box.track_id == item.first; });
-  });
   const size_t n = frame->features.size();
   frame->static_probability.assign(n, 1.0f);
   frame->motion_log_odds.assign(n, 0.0f);
@@ -146,11 +140,11 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     counts.outside = static_cast<int>(n);
     return counts;
   }
-  std::vector<uint8_t> in_box(n, 0);
+  in_box_.assign(n, 0);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
     const double at_rest = AtRestByBoxes(frame->features.keypoints[i], weights, &is_inside);
-    in_box[i] = is_inside ? 1 : 0;
+    in_box_[i] = is_inside ? 1 : 0;
     if (weights) {
       // However many boxes overlap, motion can still overrule them.
       prior_[i] = static_cast<float>(std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object));
@@ -166,7 +160,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
     const bool used = frame->static_probability[i] >= kMinStaticProbability;
-    ++(in_box[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
+    ++(in_box_[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
   }
   return counts;
 }
@@ -202,7 +196,7 @@ void DynamicFilter::JudgeByDisplacement(const KeypointFlow& flow, const Frame& l
     const Keypoint& from = last.features.keypoints[flow.last_keypoints()[i]];
     displacements[i] = positions[i] - Eigen::Vector2d(from.raw_x, from.raw_y);
   }
-  const SelectiveResult result = SelectiveTracking(options_.selective, positions, displacements, Boxes());
+  const SelectiveResult result = SelectiveTracking(options_.selective, positions, displacements, boxes_);
   for (size_t i = 0; i < n; ++i) {
     const bool used =
         result.keypoints[i] == KeypointJudgement::kStatic || result.keypoints[i] == KeypointJudgement::kKept;
@@ -210,29 +204,28 @@ void DynamicFilter::JudgeByDisplacement(const KeypointFlow& flow, const Frame& l
   }
 }
 
-std::vector<DynamicFilter::Mover> DynamicFilter::FindMovers(const KeypointFlow& flow) const {
-  std::vector<Mover> movers;
-  std::vector<Box> from;
-  std::vector<Eigen::Vector2d> expected;
-  for (const Object& object : objects_) {
+void DynamicFilter::FindMovers(const KeypointFlow& flow) {
+  movers_.clear();
+  boxes_before_.clear();
+  expected_px_.clear();
+  for (size_t k = 0; k < objects_.size(); ++k) {
     for (const Object& before : last_objects_) {
-      if (before.box.track_id != object.box.track_id) continue;
-      const Box &a = before.box.box, &b = object.box.box;
-      movers.push_back({object.box.track_id, a, b, {}});
-      from.push_back(a);
-      expected.emplace_back(b.CenterX() - a.CenterX(), b.CenterY() - a.CenterY());
+      if (before.box.track_id != objects_[k].box.track_id) continue;
+      const Box &a = before.box.box, &b = boxes_[k];
+      movers_.push_back({k, a, b, {}});
+      boxes_before_.push_back(a);
+      expected_px_.emplace_back(b.CenterX() - a.CenterX(), b.CenterY() - a.CenterY());
     }
   }
-  const std::vector<std::vector<PointMotion>> shared = ShareMotions(from, expected, flow.motions());
+  const std::span<const std::optional<BoxMotion>> motions =
+      estimator_.Estimate(boxes_before_, expected_px_, flow.motions());
   size_t found = 0;
-  for (size_t k = 0; k < movers.size(); ++k) {
-    const auto motion = MotionOfBox(from[k], shared[k]);
-    if (!motion) continue;
-    movers[found] = movers[k];
-    movers[found++].motion = *motion;
+  for (size_t k = 0; k < movers_.size(); ++k) {
+    if (!motions[k]) continue;
+    movers_[found] = movers_[k];
+    movers_[found++].motion = *motions[k];
   }
-  movers.resize(found);
-  return movers;
+  movers_.resize(found);
 }
 
 // Whether the object as a whole moved. Where what is at rest shows no parallax, neither does an object that
@@ -248,18 +241,18 @@ void DynamicFilter::WatchObject(const Mover& mover, const Rigid3& frame_from_las
   const double sigma_px = std::numbers::sqrt2;
   const bool moves = DistanceToSegment(moved_px, far_px, near_px) > kApart * sigma_px;
   if (!moves && (moved_px - far_px).norm() < kApart * sigma_px) return;
-  double& odds = object_log_odds_[mover.track_id];
+  double& odds = objects_[mover.object].motion_log_odds;
   odds = std::clamp(odds - EvidenceOfRest(!moves), -kMostObjectEvidence, kMostObjectEvidence);
 }
 
 void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
   if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
   DS_TRACE("tracking/watch");
-  const std::vector<Mover> movers = FindMovers(flow);
-  if (movers.empty()) return;
+  FindMovers(flow);
+  if (movers_.empty()) return;
   const Rigid3 frame_from_last = frame->cam_from_world * last.cam_from_world.Inverse();
   const double nearest_depth = kNearestDepthRatio * median_depth;
-  for (const Mover& mover : movers) WatchObject(mover, frame_from_last, nearest_depth);
+  for (const Mover& mover : movers_) WatchObject(mover, frame_from_last, nearest_depth);
   const Eigen::Matrix3d rotation = frame_from_last.Matrix();
   // At rest, it lies on the epipolar line between where infinity and the nearest depth go.
   const auto rest = [&](const Eigen::Vector2d& before_px) -> std::optional<RestPlace> {
@@ -268,14 +261,14 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
     if (far.z() <= 0 || near.z() <= 0) return std::nullopt;
     return RestPlace{camera_.Project(far), camera_.Project(near)};
   };
-  WatchKeypoints(rest, movers, flow, last, frame);
+  WatchKeypoints(rest, flow, last, frame);
 }
 
 void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last, Frame* frame) {
   if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
   DS_TRACE("tracking/watch");
-  const std::vector<Mover> movers = FindMovers(flow);
-  if (movers.empty()) return;
+  FindMovers(flow);
+  if (movers_.empty()) return;
   std::vector<PointMotion> outside;
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
     const uint32_t from = flow.last_keypoints()[i];
@@ -292,12 +285,12 @@ void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last,
     const Eigen::Vector2d px = flow_at_rest->Move(before_px);
     return RestPlace{px, px, flow_at_rest->Variance(before_px)};
   };
-  WatchKeypoints(rest, movers, flow, last, frame);
+  WatchKeypoints(rest, flow, last, frame);
 }
 
 template <class Rest>
-void DynamicFilter::WatchKeypoints(const Rest& rest, std::span<const Mover> movers, const KeypointFlow& flow,
-                                   const Frame& last, Frame* frame) const {
+void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, const Frame& last,
+                                   Frame* frame) const {
   const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
     if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
@@ -320,7 +313,7 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, std::span<const Mover> move
     // who walks tells little where another stands.
     double sum_density = 0;
     int objects = 0;
-    for (const Mover& mover : movers) {
+    for (const Mover& mover : movers_) {
       const double ring_px = KeypointFlow::kReach * std::sqrt(mover.to.Area());
       if (!mover.to.Contains(now.raw_x, now.raw_y, ring_px)) continue;
       ++objects;

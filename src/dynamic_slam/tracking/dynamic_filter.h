@@ -1,6 +1,6 @@
 #pragma once
 
-#include <map>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -41,7 +41,7 @@ class DynamicFilter {
 
   // The boxes of the last Judge that are to be watched: of dynamic objects, and of those like a parked car
   // whose class is dynamic and which do not move.
-  std::vector<Box> Boxes() const;
+  const std::vector<Box>& Boxes() const { return boxes_; }
 
   // Whether a point of the frame (ideal px) is in the box of something that moves.
   bool IsHidden(const Eigen::Vector2d& ideal_px) const;
@@ -64,14 +64,15 @@ class DynamicFilter {
   // Something whose class is dynamic.
   struct Object {
     DynamicBox box;
-    double moves;  // P(moves) by its class and its motion so far
+    double moves;                // P(moves) by its class and its motion so far
+    double motion_log_odds = 0;  // of moving: what its motion tells beside the class
 
     bool IsMoving() const { return moves >= 0.5; }
   };
 
   // An object that is in the last frame too, and how it moved in the image.
   struct Mover {
-    int track_id;
+    size_t object;  // in objects_
     Box from, to;
     BoxMotion motion;
   };
@@ -85,19 +86,25 @@ class DynamicFilter {
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
   double AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const;
-  std::vector<Mover> FindMovers(const KeypointFlow& flow) const;
+  void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
   template <class Rest>
-  void WatchKeypoints(const Rest& rest, std::span<const Mover> movers, const KeypointFlow& flow,
-                      const Frame& last, Frame* frame) const;
+  void WatchKeypoints(const Rest& rest, const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   void WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth);
 
   Camera camera_;
   DynamicOptions options_;
   std::vector<float> octave_scales_;
   std::vector<Object> objects_, last_objects_;
-  std::map<int, double> object_log_odds_;  // of moving, by track id: what their motion tells beside the class
-  std::vector<float> prior_;               // P(at rest) of each keypoint by the boxes alone
+  std::vector<Box> boxes_;    // of objects_
+  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
+
+  // Kept from frame to frame for their memory.
+  std::vector<Mover> movers_;
+  std::vector<uint8_t> in_box_;  // of each keypoint
+  BoxMotionEstimator estimator_;
+  std::vector<Box> boxes_before_;
+  std::vector<Eigen::Vector2d> expected_px_;
 };
 
 }  // namespace dynamic_slam

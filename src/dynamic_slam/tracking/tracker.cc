@@ -333,12 +333,12 @@ bool Tracker::Relocalise() {
 }
 
 // Of the landmarks that the frame shows.
-double Tracker::MedianDepthOfFrame() const {
-  std::vector<double> depths;
+double Tracker::MedianDepthOfFrame() {
+  depths_.clear();
   for (size_t i = 0; i < frame_.landmarks.size(); ++i) {
-    if (frame_.landmarks[i].IsValid()) depths.push_back((frame_.cam_from_world * frame_.points[i]).z());
+    if (frame_.landmarks[i].IsValid()) depths_.push_back((frame_.cam_from_world * frame_.points[i]).z());
   }
-  return depths.empty() ? 0 : Median(&depths);
+  return depths_.empty() ? 0 : Median(&depths_);
 }
 
 void Tracker::CountVisibility() {

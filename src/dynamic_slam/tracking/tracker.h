@@ -110,7 +110,7 @@ class Tracker {
   bool TrackLocalMap(double radius_px, int min_inliers);
   void RefreshLastFrame();
   std::optional<Rigid3> PredictMotion() const;
-  double MedianDepthOfFrame() const;
+  double MedianDepthOfFrame();
   void CountVisibility();
   void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
   void StartAnewWhenLostForLong(TrackingResult* result);
@@ -147,6 +147,7 @@ class Tracker {
   std::string reason_;
   uint32_t revision_ = 0;  // of the map, when the frame's points were taken out of it
   VisibilityLog visibility_;
+  std::vector<double> depths_;  // kept for its memory
 };
 
 }  // namespace dynamic_slam

@@ -5,6 +5,7 @@ const COLOURS = {tracking: 0x3ddc84, initialising: 0xf2b84b, lost: 0xff5a4f, pat
 const FADE_IN_S = 0.5, FADE_OUT_S = 1.2, LOOP_S = 5;
 const SLOW_S = 1 / 32, FAST_S = 1 / 45, STILL_S = 0.3;  // of the time from frame to frame; then of rest, before all is drawn
 const MIN_POINTS = 10000, MAX_POINTS = 1e7;
+const SHARED_S = 0.1;  // from frame to frame while the processor draws that tracks as well
 
 const POINT_VERTEX = `
   attribute float born, died, part;
@@ -166,7 +167,8 @@ function isDrawnInSoftware() {
 class MapView {
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: !isDrawnInSoftware(), preserveDrawingBuffer: true});
+    this.isSoftware = isDrawnInSoftware();
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: !this.isSoftware, preserveDrawingBuffer: true});
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setClearColor(0x0d1117);
     this.scene = new THREE.Scene();
@@ -177,7 +179,8 @@ class MapView {
     this.eye.position.set(0, 1.2, 2.4);
     this.control = new THREE.OrbitControls(this.eye, canvas);
     this.control.addEventListener("change", () => this.redraw());
-    this.control.addEventListener("start", () => { this.chases = false; });
+    this.control.addEventListener("start", () => { this.chases = false; this.isHeld = true; });
+    this.control.addEventListener("end", () => { this.isHeld = false; });
     this.points = new Points(this.world);
     this.edges = makeLines(this.world, COLOURS.edge, 0.45);
     this.keyframeLines = makeLines(this.world, COLOURS.keyframe, 0.9);
@@ -345,8 +348,13 @@ class MapView {
     this.redraw(LOOP_S);
   }
 
+  // Drawing by the run's own processors gives way to it, but to a hand that turns the view at once.
   draw() {
     const now = this.seconds();
+    if (this.sharesProcessors && !this.isHeld && now < this.drawnAt + SHARED_S) {
+      this.hasDrawn = false;
+      return;
+    }
     if (this.hasDrawn) this.points.adapt(now - this.called);  // the browser calls late when drawing took long
     this.called = now;
     this.hasDrawn = false;
@@ -362,6 +370,7 @@ class MapView {
       loop.tube.material.opacity = age >= 1 ? 0.25 : 0.25 + 0.75 * Math.abs(Math.cos(3 * Math.PI * age));
     }
     this.renderer.render(this.scene, this.eye);
+    this.drawnAt = now;
     this.drawn = (this.drawn || 0) + 1;
   }
 }

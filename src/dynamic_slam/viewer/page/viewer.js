@@ -4,10 +4,10 @@
 const HELLO = 1, FRAME = 2, MAP = 3, EVENT = 4, PLAYER = 5, HEADER = 12;
 const STATES = ["initialising", "tracking", "lost"];
 const STATE_COLOURS = ["#f2b84b", "#3ddc84", "#ff5a4f"];
-const MAX_EVENTS = 200, SEEK_MS = 120;
+const MAX_EVENTS = 200, SEEK_MS = 120, SHARED_MS = 100;
 
 const $ = (id) => document.getElementById(id);
-const page = {live: null, map: null, video: null, hello: {}, paused: false, lastSeek: 0, seekTimer: 0, events: 0, scrubbing: false};
+const page = {live: null, map: null, video: null, hello: {}, paused: false, lastSeek: 0, seekTimer: 0, events: 0, scrubbing: false, newest: null, frameTimer: 0, lastFrame: 0, sharesProcessors: false};
 
 function setState(state, reason) {
   document.body.dataset.state = state;
@@ -35,7 +35,10 @@ function onHello(hello) {
     drawStates(hello.states);
   }
   setLink(isReplay ? "recording" : `live, ${hello.run}`, false);
+  // A browser that draws by software most likely runs beside the SLAM, which needs the processors more.
+  page.sharesProcessors = !isReplay && Boolean(page.map) && page.map.isSoftware;
   if (page.map) {
+    page.map.sharesProcessors = page.sharesProcessors;
     page.map.camera = hello;
     if (page.known !== hello.source) page.map.clear();
     if (page.map.chases) page.map.placed = false;  // after a jump, at once
@@ -112,24 +115,40 @@ function section(buffer, at) {
 const parse = (bytes) => JSON.parse(new TextDecoder().decode(bytes));
 
 function onMessage(buffer) {
-  const view = new DataView(buffer), type = view.getUint32(0, true), frame = view.getUint32(4, true), detail = view.getUint32(8, true);
+  const view = new DataView(buffer), type = view.getUint32(0, true);
   if (type === MAP) {
-    if (page.map) page.map.apply(view, HEADER, detail === 1);
+    if (page.map) page.map.apply(view, HEADER, view.getUint32(8, true) === 1);
     return;
   }
-  const json = section(buffer, HEADER);
-  if (type === HELLO) onHello(parse(json.bytes));
-  if (type === EVENT) onEvent(parse(json.bytes));
-  if (type === PLAYER) onPlayer(parse(json.bytes));
-  if (type !== FRAME) return;
-  const facts = parse(json.bytes), points = section(buffer, json.next), jpeg = section(buffer, points.next);
-  facts.frame = frame;
+  if (type === FRAME) return onFrame(buffer);
+  const json = parse(section(buffer, HEADER).bytes);
+  if (type === HELLO) onHello(json);
+  if (type === EVENT) onEvent(json);
+  if (type === PLAYER) onPlayer(json);
+}
+
+// Shows the frame, or, where processors are shared, the newest one when it is time.
+function onFrame(buffer) {
+  page.newest = buffer;
+  const wait = page.sharesProcessors ? page.lastFrame + SHARED_MS - performance.now() : 0;
+  if (wait <= 0) showNewest();
+  else if (!page.frameTimer) page.frameTimer = setTimeout(showNewest, wait);
+}
+
+function showNewest() {
+  clearTimeout(page.frameTimer);
+  page.frameTimer = 0;
+  page.lastFrame = performance.now();
+  const buffer = page.newest, view = new DataView(buffer), state = view.getUint32(8, true);
+  const json = section(buffer, HEADER), points = section(buffer, json.next), jpeg = section(buffer, points.next);
+  const facts = parse(json.bytes);
+  facts.frame = view.getUint32(4, true);
   page.facts = facts;
-  setState(STATES[detail] || facts.state, facts.reason);
+  setState(STATES[state] || facts.state, facts.reason);
   showFacts(facts);
   const keypoints = new Uint16Array(buffer, points.bytes.byteOffset, points.bytes.length / 2);
   page.video.show(jpeg.bytes, facts, keypoints).catch(() => {});
-  if (page.map) page.map.show(facts.pose, STATES[detail]);
+  if (page.map) page.map.show(facts.pose, STATES[state]);
 }
 
 function connect() {
