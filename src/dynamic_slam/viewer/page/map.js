@@ -5,7 +5,7 @@ const COLOURS = {tracking: 0x3ddc84, initialising: 0xf2b84b, lost: 0xff5a4f, pat
 const FADE_IN_S = 0.5, FADE_OUT_S = 1.2, LOOP_S = 5;
 const SLOW_S = 1 / 32, FAST_S = 1 / 45, STILL_S = 0.3;  // of the time from frame to frame; then of rest, before all is drawn
 const MIN_POINTS = 10000, MAX_POINTS = 1e7;
-const SHARED_S = 0.1;  // from frame to frame while the processor draws that tracks as well
+const SHARED_S = 0.2;  // from frame to frame while the processor draws that tracks as well
 
 const POINT_VERTEX = `
   attribute float born, died, part;

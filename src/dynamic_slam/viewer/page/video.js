@@ -8,7 +8,8 @@ const MOVER = "#ff5a4f", STILL = "#9fb0c3";
 class VideoView {
   constructor(canvas) {
     this.canvas = canvas;
-    this.context = canvas.getContext("2d");
+    // Where the processor draws all the same, it is ten times faster without the detour through WebGL.
+    this.context = canvas.getContext("2d", {willReadFrequently: isDrawnInSoftware()});
     this.shown = -1;
     this.newest = 0;
   }
