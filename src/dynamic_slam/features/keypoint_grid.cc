@@ -28,7 +28,7 @@ void KeypointGrid::Build(const FeatureSet& features, const std::array<double, 4>
   entries_.resize(count);
   for (size_t i = 0; i < count; ++i) {
     const Keypoint& keypoint = features.keypoints[i];
-    entries_[next_[cell_of_[i]]++] = {keypoint.x, keypoint.y, static_cast<uint32_t>(i)};
+    entries_[next_[cell_of_[i]]++] = {keypoint.x, keypoint.y, static_cast<uint32_t>(i), keypoint.octave};
   }
 }
 

@@ -22,15 +22,19 @@ class KeypointGrid {
 
   size_t size() const { return entries_.size(); }
 
-  // Calls fn(uint32_t index) for each keypoint at a distance <= radius_px from the ideal pixel (x, y), and
-  // for no other, cell by cell (row-major), in a cell by index. An empty grid, a negative radius or a NaN
-  // finds nothing.
+  // Calls fn(uint32_t index) for each keypoint at a distance <= radius_px from the ideal pixel (x, y) and of
+  // an octave from min_octave to max_octave, and for no other, cell by cell (row-major), in a cell by index.
+  // An empty grid, a negative radius or a NaN finds nothing.
   template <class Fn>
-  void ForEachInRadius(float x, float y, float radius_px, Fn&& fn) const {
-    if (entries_.empty() || !(radius_px >= 0) || x != x || y != y) return;
+  void ForEachInWindow(float x, float y, float radius_px, int min_octave, int max_octave, Fn&& fn) const {
+    if (entries_.empty() || !(radius_px >= 0) || x != x || y != y || min_octave > max_octave) return;
     const int first_column = Column(x - radius_px), last_column = Column(x + radius_px);
     const int first_row = Row(y - radius_px), last_row = Row(y + radius_px);
     const float radius_squared = radius_px * radius_px;
+    // Where keypoints are is hard to predict, so they are first found without a branch, then visited.
+    constexpr size_t kMost = 128;
+    uint32_t found[kMost];
+    size_t count = 0;
     for (int row = first_row; row <= last_row; ++row) {
       // The cells of a row are neighbours in memory, so their keypoints are one range.
       const uint32_t begin = cell_begin_[row * columns_ + first_column];
@@ -38,15 +42,23 @@ class KeypointGrid {
       for (uint32_t i = begin; i < end; ++i) {
         const Entry& entry = entries_[i];
         const float dx = entry.x - x, dy = entry.y - y;
-        if (dx * dx + dy * dy <= radius_squared) fn(entry.index);
+        found[count] = entry.index;
+        count += static_cast<size_t>((dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
+                                     (entry.octave <= max_octave));
+        if (count == kMost) {
+          for (const uint32_t index : found) fn(index);
+          count = 0;
+        }
       }
     }
+    for (size_t i = 0; i < count; ++i) fn(found[i]);
   }
 
  private:
   struct Entry {
     float x, y;  // ideal px; copied here so that a query reads one array only
     uint32_t index;
+    int octave;
   };
 
   // Clamped before the conversion: far outside, the float does not fit an int.

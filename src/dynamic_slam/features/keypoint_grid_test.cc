@@ -11,6 +11,7 @@
 namespace dynamic_slam {
 namespace {
 
+constexpr int kOctaves = 8;
 constexpr std::array<double, 4> kBounds = {-12.5, -7.25, 652.75, 491};
 
 FeatureSet RandomFeatures(int count, uint64_t seed) {
@@ -21,15 +22,18 @@ FeatureSet RandomFeatures(int count, uint64_t seed) {
     // A little beyond the bounds too.
     keypoint.x = static_cast<float>(random.Uniform(kBounds[0] - 5, kBounds[2] + 5));
     keypoint.y = static_cast<float>(random.Uniform(kBounds[1] - 5, kBounds[3] + 5));
+    keypoint.octave = static_cast<int>(random.Index(kOctaves));
     features.keypoints.push_back(keypoint);
     features.descriptors.emplace_back();
   }
   return features;
 }
 
-std::vector<uint32_t> Query(const KeypointGrid& grid, float x, float y, float radius_px) {
+std::vector<uint32_t> Query(const KeypointGrid& grid, float x, float y, float radius_px, int min_octave = 0,
+                            int max_octave = kOctaves - 1) {
   std::vector<uint32_t> found;
-  grid.ForEachInRadius(x, y, radius_px, [&](uint32_t index) { found.push_back(index); });
+  grid.ForEachInWindow(x, y, radius_px, min_octave, max_octave,
+                       [&](uint32_t index) { found.push_back(index); });
   return found;
 }
 
@@ -43,13 +47,18 @@ TEST(KeypointGrid, FindsExactlyWhatBruteForceFinds) {
   for (int query = 0; query < 500; ++query) {
     const float x = static_cast<float>(random.Uniform(-60, 700));
     const float y = static_cast<float>(random.Uniform(-60, 540));
-    const float radius_px = static_cast<float>(random.Uniform(0, 80));
+    // The largest windows hold more keypoints than are collected at a time.
+    const float radius_px = static_cast<float>(random.Uniform(0, query % 10 == 0 ? 400 : 80));
+    const int min_octave = static_cast<int>(random.Index(kOctaves)) - 1, max_octave = min_octave + query % 9;
     std::vector<uint32_t> expected;
     for (uint32_t i = 0; i < features.size(); ++i) {
       const float dx = features.keypoints[i].x - x, dy = features.keypoints[i].y - y;
+      const int octave = features.keypoints[i].octave;
+      if (octave < min_octave || octave > max_octave) continue;
       if (dx * dx + dy * dy <= radius_px * radius_px) expected.push_back(i);
     }
-    EXPECT_THAT(Query(grid, x, y, radius_px), testing::UnorderedElementsAreArray(expected));
+    EXPECT_THAT(Query(grid, x, y, radius_px, min_octave, max_octave),
+                testing::UnorderedElementsAreArray(expected));
     total += expected.size();
   }
   EXPECT_GT(total, 1000u);

@@ -45,18 +45,26 @@ DS_DISPATCH_POPCNT
 WindowMatch FindInWindow(const FeatureSet& features, const KeypointGrid& grid, const SearchWindow& window,
                          const Descriptor& descriptor, std::span<const uint8_t> taken) {
   WindowMatch best;
-  grid.ForEachInRadius(window.x, window.y, window.radius_px, [&](uint32_t index) {
-    const int octave = features.keypoints[index].octave;
-    if (octave < window.min_octave || octave > window.max_octave) return;
+  uint32_t second = 0;
+  // Inlined, as a function of its own would be compiled for the plain processor only.
+  const auto visit = [&](uint32_t index) __attribute__((always_inline)) {
     if (!taken.empty() && taken[index] != 0) return;
     const int distance = HammingDistance(descriptor, features.descriptors[index]);
     if (distance < best.distance) {
-      best = {index, distance, best.distance, octave, best.octave};
+      second = best.keypoint;
+      best.second_distance = best.distance;
+      best.keypoint = index;
+      best.distance = distance;
     } else if (distance < best.second_distance) {
+      second = index;
       best.second_distance = distance;
-      best.second_octave = octave;
     }
-  });
+  };
+  grid.ForEachInWindow(window.x, window.y, window.radius_px, window.min_octave, window.max_octave, visit);
+  if (best.Found()) best.octave = features.keypoints[best.keypoint].octave;
+  if (best.second_distance < WindowMatch().second_distance) {
+    best.second_octave = features.keypoints[second].octave;
+  }
   return best;
 }
 

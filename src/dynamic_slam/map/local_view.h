@@ -38,6 +38,7 @@ class LocalViewBuilder {
   std::vector<int> votes_;            // by keyframe id
   std::vector<uint32_t> visited_by_;  // by landmark id: the last Build that copied it
   std::vector<KeyframeId> keyframes_;
+  std::vector<const Landmark*> landmarks_;  // during Build
   std::vector<CovisibleKeyframe> neighbours_;
   uint32_t build_ = 0;
 };

@@ -11,7 +11,7 @@ namespace dynamic_slam {
 namespace {
 
 // Above this many free poses the reduced camera system is factorised sparsely.
-constexpr int kMostPosesForDenseSchur = 100;
+constexpr int kMostPosesForDenseSchur = 200;
 
 // The rounds of an adjustment, on a copy of the problem.
 class Adjuster {

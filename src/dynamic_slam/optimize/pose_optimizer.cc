@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <Eigen/Cholesky>
 
+#include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/base/error.h"
 
 namespace dynamic_slam {
@@ -14,7 +16,7 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr int kLanes = 4;  // observations in a block: sums stay apart per lane, so the compiler may vectorise
+constexpr int kLanes = 4;  // observations in a block; sums stay apart per lane
 constexpr int kMinPoints = 3;
 constexpr double kMinDepth = 1e-9;  // of a point in front of the camera, in units of the map
 
@@ -29,70 +31,64 @@ struct NormalEquations {
   double cost;
 };
 
+// One number of each observation in a block. The compiler splits it into what the processor has.
+using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+
+inline void Load(const std::vector<double>& from, size_t begin, Lanes* to) {
+  std::memcpy(to, from.data() + begin, sizeof(Lanes));
+}
+
 // Sums J^T W J, J^T W r and the cost of Eq. (10) over observations, whose number is a multiple of kLanes.
 // `delta_squared` is the squared error at which the Huber kernel becomes linear (infinity: no kernel).
+DS_DISPATCH_AVX2
 void Accumulate(const PoseObservations& o, const Rigid3& cam_from_world, double fx, double fy, double cx,
                 double cy, double delta_squared, NormalEquations* out) {
   const Eigen::Matrix3d R = cam_from_world.Matrix();
   const Eigen::Vector3d t = cam_from_world.translation;
   const double delta = std::sqrt(delta_squared);
-  double hessian[21][kLanes] = {};
-  double gradient[6][kLanes] = {};
-  double cost[kLanes] = {};
+  Lanes hessian[21] = {}, gradient[6] = {}, cost = {};
+  const Lanes zero = {}, one = zero + 1.0, min_depth = zero + kMinDepth, min_error = zero + 1e-300;
 
   for (size_t begin = 0; begin < o.size(); begin += kLanes) {
-    double ju[6][kLanes], jv[6][kLanes], ru[kLanes], rv[kLanes], w[kLanes];
-    for (int k = 0; k < kLanes; ++k) {
-      const size_t i = begin + k;
-      const double x = R(0, 0) * o.x[i] + R(0, 1) * o.y[i] + R(0, 2) * o.z[i] + t[0];
-      const double y = R(1, 0) * o.x[i] + R(1, 1) * o.y[i] + R(1, 2) * o.z[i] + t[1];
-      const double z = R(2, 0) * o.x[i] + R(2, 1) * o.y[i] + R(2, 2) * o.z[i] + t[2];
-      const bool in_front = z > kMinDepth;
-      const double inverse_z = 1.0 / (in_front ? z : 1.0);
-      const double a = x * inverse_z;
-      const double b = y * inverse_z;
-      const double su = fx * o.inverse_sigma_px[i];
-      const double sv = fy * o.inverse_sigma_px[i];
-      ru[k] = su * a + (cx - o.u[i]) * o.inverse_sigma_px[i];
-      rv[k] = sv * b + (cy - o.v[i]) * o.inverse_sigma_px[i];
-      // d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
-      ju[0][k] = -su * a * b;
-      ju[1][k] = su * (1.0 + a * a);
-      ju[2][k] = -su * b;
-      ju[3][k] = su * inverse_z;
-      ju[4][k] = 0.0;
-      ju[5][k] = -su * a * inverse_z;
-      jv[0][k] = -sv * (1.0 + b * b);
-      jv[1][k] = sv * a * b;
-      jv[2][k] = sv * a;
-      jv[3][k] = 0.0;
-      jv[4][k] = sv * inverse_z;
-      jv[5][k] = -sv * b * inverse_z;
-      // A point that a step takes behind the camera has no derivative; it counts as one focal length of
-      // error, so that leaving the view is no way to lower the cost.
-      const double e2 = in_front ? ru[k] * ru[k] + rv[k] * rv[k] : su * su;
-      const double e = std::sqrt(std::max(e2, 1e-300));
-      const bool linear = e2 > delta_squared;
-      const double rho = linear ? 2.0 * delta * e - delta_squared : e2;
-      const double slope = linear ? delta / e : 1.0;
-      cost[k] += o.weight[i] * rho;
-      w[k] = in_front ? o.weight[i] * slope : 0.0;
-    }
+    Lanes wx, wy, wz, u, v, inverse_sigma, weight;
+    Load(o.x, begin, &wx);
+    Load(o.y, begin, &wy);
+    Load(o.z, begin, &wz);
+    Load(o.u, begin, &u);
+    Load(o.v, begin, &v);
+    Load(o.inverse_sigma_px, begin, &inverse_sigma);
+    Load(o.weight, begin, &weight);
+    const Lanes x = R(0, 0) * wx + R(0, 1) * wy + R(0, 2) * wz + t[0];
+    const Lanes y = R(1, 0) * wx + R(1, 1) * wy + R(1, 2) * wz + t[1];
+    const Lanes z = R(2, 0) * wx + R(2, 1) * wy + R(2, 2) * wz + t[2];
+    const auto in_front = z > min_depth;
+    const Lanes inverse_z = one / (in_front ? z : one);
+    const Lanes a = x * inverse_z, b = y * inverse_z;
+    const Lanes su = fx * inverse_sigma, sv = fy * inverse_sigma;
+    const Lanes ru = su * a + (cx - u) * inverse_sigma;
+    const Lanes rv = sv * b + (cy - v) * inverse_sigma;
+    // d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
+    const Lanes ju[6] = {-su * a * b, su * (1.0 + a * a), -su * b, su * inverse_z, zero, -su * a * inverse_z};
+    const Lanes jv[6] = {-sv * (1.0 + b * b), sv * a * b, sv * a, zero, sv * inverse_z, -sv * b * inverse_z};
+    // A point that a step takes behind the camera has no derivative; it counts as one focal length of
+    // error, so that leaving the view is no way to lower the cost.
+    const Lanes e2 = in_front ? ru * ru + rv * rv : su * su;
+    Lanes e = e2 < min_error ? min_error : e2;
+    for (int k = 0; k < kLanes; ++k) e[k] = std::sqrt(e[k]);
+    const auto is_linear = e2 > zero + delta_squared;
+    cost += weight * (is_linear ? 2.0 * delta * e - delta_squared : e2);
+    const Lanes w = in_front ? weight * (is_linear ? delta / e : one) : zero;
     int entry = 0;
+#pragma GCC unroll 6
     for (int row = 0; row < 6; ++row) {
-      double wu[kLanes], wv[kLanes];
-      for (int k = 0; k < kLanes; ++k) {
-        wu[k] = w[k] * ju[row][k];
-        wv[k] = w[k] * jv[row][k];
-        gradient[row][k] += wu[k] * ru[k] + wv[k] * rv[k];
-      }
-      for (int col = row; col < 6; ++col, ++entry) {
-        for (int k = 0; k < kLanes; ++k) hessian[entry][k] += wu[k] * ju[col][k] + wv[k] * jv[col][k];
-      }
+      const Lanes wu = w * ju[row], wv = w * jv[row];
+      gradient[row] += wu * ru + wv * rv;
+#pragma GCC unroll 6
+      for (int col = row; col < 6; ++col, ++entry) hessian[entry] += wu * ju[col] + wv * jv[col];
     }
   }
 
-  const auto sum = [](const double* lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); };
+  const auto sum = [](const Lanes& lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); };
   int entry = 0;
   for (int row = 0; row < 6; ++row) {
     out->gradient[row] = sum(gradient[row]);
