@@ -6,6 +6,9 @@ import sys
 import tempfile
 import unittest
 
+import walk_film
+from walk_film import run
+
 try:
     import rosbag
 except ImportError as missing:
@@ -14,12 +17,6 @@ except ImportError as missing:
 
 PROGRAM, BUILD = sys.argv.pop(1), sys.argv.pop(1)
 FRAMES = 40
-
-
-def run(program, *arguments):
-    result = subprocess.run([program, *arguments], capture_output=True, text=True)
-    assert result.returncode == 0, f"{program} {arguments}: {result.stderr}"
-    return result.stdout
 
 
 def content(*path):
@@ -31,9 +28,7 @@ class BagTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
-        cls.sequence, cls.bag = cls.path("walk"), cls.path("walk.bag")
-        run(PROGRAM, "simulate", "office_walk", "--frames", str(FRAMES), "--out", cls.sequence)
-        run(cls.tool("make_bag"), cls.sequence, cls.bag)
+        cls.sequence, cls.bag = walk_film.make(PROGRAM, BUILD, cls.path(), FRAMES)
         cls.detector = ("--detector", f"boxes:{cls.sequence}/boxes.csv")
 
     @classmethod

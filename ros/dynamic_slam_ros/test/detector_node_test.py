@@ -2,11 +2,11 @@
 
 import collections
 import os
-import subprocess
 import sys
 import unittest
 
 import ros_graph
+import walk_film
 from ros_graph import Listener, Network, Relay, pose_tuple, wait_until
 
 import rospy
@@ -25,19 +25,11 @@ GRAPH = None
 SEQUENCE, BAG = "", ""
 
 
-def run(program, *arguments):
-    result = subprocess.run([program, *arguments], capture_output=True, text=True)
-    assert result.returncode == 0, f"{program} {arguments}: {result.stderr}"
-    return result.stdout
-
-
 def setUpModule():
     global GRAPH, NETWORK, SEQUENCE, BAG
     NETWORK = Network()
     GRAPH = ros_graph.Graph(BUILD, "127.0.0.1" if NETWORK.problem else Network.HERE)
-    SEQUENCE, BAG = GRAPH.path("walk"), GRAPH.path("walk.bag")
-    run(PROGRAM, "simulate", "office_walk", "--frames", str(FRAMES), "--out", SEQUENCE)
-    run(os.path.join(BUILD, "make_bag"), SEQUENCE, BAG)
+    SEQUENCE, BAG = walk_film.make(PROGRAM, BUILD, GRAPH.path(), FRAMES)
 
 
 def tearDownModule():

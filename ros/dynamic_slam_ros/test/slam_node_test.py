@@ -4,11 +4,11 @@ import math
 import os
 import random
 import struct
-import subprocess
 import sys
 import unittest
 
 import ros_graph
+import walk_film
 from ros_graph import Listener, pose_tuple, wait_until
 
 import rospy
@@ -33,18 +33,10 @@ GRAPH = None
 SEQUENCE, BAG = "", ""
 
 
-def run(program, *arguments):
-    result = subprocess.run([program, *arguments], capture_output=True, text=True)
-    assert result.returncode == 0, f"{program} {arguments}: {result.stderr}"
-    return result.stdout
-
-
 def setUpModule():
     global GRAPH, SEQUENCE, BAG
     GRAPH = ros_graph.Graph(BUILD)
-    SEQUENCE, BAG = GRAPH.path("walk"), GRAPH.path("walk.bag")
-    run(PROGRAM, "simulate", "office_walk", "--frames", str(FRAMES), "--out", SEQUENCE)
-    run(os.path.join(BUILD, "make_bag"), SEQUENCE, BAG)
+    SEQUENCE, BAG = walk_film.make(PROGRAM, BUILD, GRAPH.path(), FRAMES)
 
 
 def tearDownModule():
@@ -189,7 +181,7 @@ class SlamNodeTest(unittest.TestCase):
 
     @staticmethod
     def keyframes(file):
-        return [line for line in run(PROGRAM, "map", "info", file).splitlines() if "keyframes" in line]
+        return [line for line in walk_film.run(PROGRAM, "map", "info", file).splitlines() if "keyframes" in line]
 
     def test_parameters_are_options(self):
         for parameter, reasons in (("_options/tracker/min_inlier:=3", ("tracker.min_inlier", "tracker.min_inliers")),
