@@ -213,6 +213,21 @@ TEST_F(SystemTest, NothingIsSeenUnderTheMask) {
   });
 }
 
+TEST_F(SystemTest, MoreKeypointsNeedMoreInliers) {
+  const Room room = MakeRoom(1);
+  const auto needed = [&](int features, const cv::Mat& image) {
+    SystemOptions options;
+    options.orb.features = features;
+    SlamSystem system(room.options().camera, options);
+    return system.Process(0, image).tracking.min_inliers;
+  };
+  const int usual = SystemOptions().tracker.min_inliers;
+  EXPECT_EQ(needed(500, room.Frame(0)), usual);
+  EXPECT_EQ(needed(1000, room.Frame(0)), usual);
+  EXPECT_EQ(needed(2000, room.Frame(0)), 2 * usual);
+  EXPECT_EQ(needed(2000, cv::Mat::zeros(480, 640, CV_8UC1)), usual) << "they were wanted, but are not there";
+}
+
 TEST_F(SystemTest, AnInterruptedRunKeepsWhatItHas) {
   const Room room = MakeRoom(200);
   SlamSystem system(room.options().camera, {});

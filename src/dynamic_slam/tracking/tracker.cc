@@ -306,7 +306,10 @@ bool Tracker::TrackFromLastFrame() {
 
 int Tracker::MinInliers() const {
   const double more = share_in_boxes_ * (options_.movers_min_inliers - options_.min_inliers);
-  return options_.min_inliers + static_cast<int>(std::lround(std::max(more, 0.0)));
+  // The options count for 1,000 keypoints: among more of them, more fit by chance, or move together.
+  const double keypoints = std::min(static_cast<double>(frame_.features.size()), 1.0 * orb_options_.features);
+  return static_cast<int>(
+      std::lround(std::max(1.0, keypoints / 1000) * (options_.min_inliers + std::max(more, 0.0))));
 }
 
 bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {

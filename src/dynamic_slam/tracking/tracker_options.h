@@ -107,7 +107,9 @@ struct TrackerOptions {
     visit("min_motion_inliers", self.min_motion_inliers,
           OptionField{"", 4, 1000, "Inliers that a first guess of the pose needs."});
     visit("min_inliers", self.min_inliers,
-          OptionField{"", 4, 1000, "Inliers with less than which the camera is lost."});
+          OptionField{"", 4, 1000,
+                      "Inliers with less than which the camera is lost; of 1,000 keypoints, and of more in "
+                      "proportion."});
     visit(
         "movers_min_inliers", self.movers_min_inliers,
         OptionField{"", 4, 1000,
