@@ -33,7 +33,8 @@ void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments
   command->add_option("--models", a.models, "Folder in which network files are looked for too");
   command->add_option("--config", a.config, "YAML file with options, or a profile: " + ProfileHelp());
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
-      ->type_name("KEY=VALUE");
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);  // else it takes SOURCE
   command->add_option("--out", a.out, fmt::format("Folder for {}", results))->capture_default_str();
   command->add_flag("--quiet", a.quiet, "No progress");
 }

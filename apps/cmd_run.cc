@@ -1,5 +1,6 @@
 #include "cmd_run.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <filesystem>
@@ -11,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
@@ -24,6 +26,7 @@
 #include "dynamic_slam/io/live_source.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/map/map_file.h"
+#include "dynamic_slam/semantics/dynamic_prior.h"
 #include "dynamic_slam/system/run_journal.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
@@ -79,6 +82,19 @@ void EndTrace(const std::string& file) {
   fmt::print("trace: {} ({} events{})\n", file, trace.events, dropped);
 }
 
+// Whether any of its classes counts as moving; a detector none of whose does is of no use, and says nothing.
+void WarnOfDetector(const Detector& detector, const DetectionOptions& options, const RunConsole& console) {
+  for (const std::string& warning : detector.warnings()) console.Say(fmt::format("warning: {}", warning));
+  const std::vector<double> scores = ClassScores(LoadDynamicPrior(options.prior), detector.class_names());
+  const bool may_move = std::any_of(scores.begin(), scores.end(),
+                                    [&](double score) { return score > options.score.threshold; });
+  if (may_move || scores.empty()) return;
+  console.Say(fmt::format(
+      "warning: the detector finds nothing that counts as moving: none of its classes ({}) scores above "
+      "{} in detector.prior ({}). Name them there.",
+      fmt::join(detector.class_names(), ", "), options.score.threshold, options.prior));
+}
+
 // What the options say of maps between runs.
 void CheckMapOptions(const RunArguments& arguments, const SystemOptions& options) {
   if (arguments.save_map_every_min > 0 && arguments.save_map.empty()) {
@@ -124,20 +140,32 @@ class Checkpoint {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+// What --scale-from asks for. A file is read before the run: whoever mistypes it must not learn that after
+// it.
+struct WantedScale {
+  ScaleSource source;
+  Trajectory metric;  // of KnownTrajectory
+
+  explicit WantedScale(const RunArguments& arguments) : source(ParseScaleSource(arguments.scale_from)) {
+    if (const auto* known = std::get_if<KnownTrajectory>(&source)) {
+      metric = ReadGroundTruth(known->file, arguments.source);
+    }
+  }
+};
+
 // How long the unit of the main part of the map is; a reason is said where that cannot be told.
-std::optional<MetricScale> FindScale(const ScaleSource& source, const RunArguments& arguments,
-                                     const SlamSystem& system) {
+std::optional<MetricScale> FindScale(const WantedScale& wanted, const SlamSystem& system) {
   const Trajectory trajectory = system.FrameTrajectory();
   try {
     if (trajectory.empty()) throw InputError("--scale-from", "there is no map", "");
     MetricScale scale;
-    if (const auto* distance = std::get_if<KnownDistance>(&source)) {
+    if (const auto* distance = std::get_if<KnownDistance>(&wanted.source)) {
       scale = ScaleFromDistance(trajectory, *distance);
-    } else if (const auto* height = std::get_if<KnownHeight>(&source)) {
+    } else if (const auto* height = std::get_if<KnownHeight>(&wanted.source)) {
       scale = ScaleFromHeight(*system.map().Read(), system.Parts().front(), *height, system.options().seed);
     } else {
-      const std::filesystem::path& file = std::get<KnownTrajectory>(source).file;
-      scale = ScaleFromTrajectory(trajectory, ReadGroundTruth(file, arguments.source), file.string());
+      scale = ScaleFromTrajectory(trajectory, wanted.metric,
+                                  std::get<KnownTrajectory>(wanted.source).file.string());
     }
     fmt::print("scale: {:.4f} m a unit, +- {:.1f} % ({}); results are in metres\n", scale.metres_per_unit,
                100 * scale.relative_error, scale.from);
@@ -181,10 +209,11 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   options.tracker.localise_only |= arguments.localise_only;
   options.backfill &= !arguments.no_backfill;
   CheckMapOptions(arguments, options);
-  std::optional<ScaleSource> scale_source;
-  if (!arguments.scale_from.empty()) scale_source = ParseScaleSource(arguments.scale_from);
+  std::optional<WantedScale> wanted_scale;
+  if (!arguments.scale_from.empty()) wanted_scale.emplace(arguments);
   const std::shared_ptr<Detector> detector = MakeDetector(arguments.detector, arguments.models);
   RunConsole console(arguments.quiet);
+  if (detector != nullptr) WarnOfDetector(*detector, options.detector, console);
   FrameSourceOptions source_options = arguments.source_options;
   source_options.on_event = [&console](const std::string& event) { console.Say(event); };
   source_options.should_stop = [&console] { return console.ShouldStop(); };
@@ -254,7 +283,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   console.End();
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
-  if (scale_source.has_value()) summary.scale = FindScale(*scale_source, arguments, system);
+  if (wanted_scale.has_value()) summary.scale = FindScale(*wanted_scale, system);
   FileWriter files;
   const bool has_results = files.Try([&] { WriteResults(out, system, summary); });
   if (has_results) journal.Remove();
@@ -295,7 +324,8 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
       "--config", a.config,
       "YAML file with options (the keys of config.yaml in the results), or a profile: " + ProfileHelp());
   command->add_option("--set", a.assignments, "One option, key=value; may be repeated")
-      ->type_name("KEY=VALUE");
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);  // else it takes SOURCE
   command->add_option("--detector", a.detector, "Object detector: " + DetectorHelp())->capture_default_str();
   command->add_option("--models", a.models, "Folder in which network files are looked for too");
   command

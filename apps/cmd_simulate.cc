@@ -76,7 +76,11 @@ void AddSimulateCommand(CLI::App& app) {
   command->add_option("--camera", a.camera, "Name or file of a camera; default: the scene's");
   command->add_option("--noise", a.noise_grey, "Standard deviation of the pixel noise, grey levels")
       ->check(CLI::Range(0.0, 50.0));
-  command->add_option("--set", a.settings, "KEY=VALUE: any option of the scene file, such as people.count=4");
+  command
+      ->add_option("--set", a.settings,
+                   "One option of the scene file, such as people.count=4; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);  // else it takes SCENE
   command->add_flag("--depth", a.depth, "Write depth images too");
   command->add_flag("--force", a.force, "Replace a sequence that is in --out");
   command->footer(

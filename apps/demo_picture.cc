@@ -50,7 +50,9 @@ void DrawScene(const DemoScene& scene, double top, Canvas* canvas) {
         place.cwiseProduct(Eigen::Vector2d(kImageWidthPx + kGapPx, RowHeight(frames)));
     const double height = RowHeight(frames) - kCaptionPx - kGapPx;
     canvas->Image(frames[i].picture, corner, kImageWidthPx, height);
-    canvas->Text(frames[i].caption, corner + Eigen::Vector2d(0, height + 14), kTextPx, kInk);
+    const double caption_px = Canvas::TextWidth(frames[i].caption, kTextPx);
+    canvas->Text(frames[i].caption, corner + Eigen::Vector2d(0, height + 14),
+                 kTextPx * std::min(1.0, kImageWidthPx / caption_px), kInk);
   }
   if (scene.truth.empty()) return;
   TrajectoryPlot plot = PlotBoth(scene.truth, scene.with, scene.without);

@@ -148,7 +148,8 @@ int Main(int argc, char** argv) {
   app.add_option("--detector", arguments.detector, "As that of `dynamic_slam run`")->capture_default_str();
   app.add_flag("--realtime", arguments.is_realtime, "At the pace of the time stamps, with threads");
   app.add_option("--set", arguments.assignments, "One option, key=value; may be repeated")
-      ->type_name("KEY=VALUE");
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);  // else it takes SOURCE
   app.add_flag("--json", arguments.json, "Print one JSON object with all digits");
   CLI11_PARSE(app, argc, argv);
   if (arguments.source.empty()) {

@@ -145,6 +145,9 @@ class CliRunTest(unittest.TestCase):
 
         self.assert_input_error([self.room, "--set", "orb.feature=100"], "orb.feature", "orb.features")
         self.assert_input_error([self.room, "--set", "orb.features=1"], "orb.features", "50")
+        # Read before the first frame, and after an option that takes one value.
+        self.assert_input_error(["--set", "orb.features=500", self.room, "--scale-from", f"file:{path('no.txt')}"],
+                                path("no.txt"))
         config = self.write("c.yaml", "orb:\n  featurs: 5\n")
         self.assert_input_error([self.room, "--config", config], "c.yaml:2", "featurs")
         self.assert_input_error([self.room, "--set", f"image.mask={path('no.png')}"], path("no.png"),
@@ -280,6 +283,15 @@ class CliRunTest(unittest.TestCase):
             if detected:
                 rows.append(f"{line.split()[0]},person,0.9,320,0,320,480")
         return self.write("boxes.csv", "\n".join(rows) + "\n")
+
+    def test_a_detector_without_a_class_that_moves_is_told_of(self):
+        rows = ["timestamp,class,score,x,y,w,h", "0,Person,0.9,320,0,320,480", "0,gizmo,0.9,0,0,320,480"]
+        out = os.path.join(self.folder, "out")
+        for boxes, is_useless in ((rows, False), (rows[::2], True)):
+            file = self.write("boxes.csv", "\n".join(boxes) + "\n")
+            result = run_program("run", self.room, "--max-frames", "3", "--detector", "boxes:" + file, "--out", out)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual("none of its classes (gizmo) scores above 5" in result.stdout + result.stderr, is_useless)
 
     def test_a_dynamic_box_is_masked_counted_and_not_trusted(self):
         out, masks = os.path.join(self.folder, "out"), os.path.join(self.folder, "masks")

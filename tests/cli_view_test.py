@@ -268,9 +268,9 @@ class PageTest(Sequence):
 
     def check_page(self, page):
         page.wait_for("page.facts && page.facts.landmarks > 100 && page.video.shown > 0")
-        page.settle()
-        self.assertGreater(page.evaluate(self.COLOURS % "map-canvas"), 50)
-        self.assertGreater(page.evaluate(self.COLOURS % "video-canvas"), 500)
+        # Beside a run the map is drawn when its turn comes.
+        page.wait_for(f"{self.COLOURS % 'map-canvas'} > 50")
+        page.wait_for(f"{self.COLOURS % 'video-canvas'} > 500")
         self.assertGreater(page.evaluate("page.map.points.places.size"), 100)
         self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), page.evaluate("innerWidth"))
         self.assertEqual(page.problems, [])

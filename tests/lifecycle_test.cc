@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/system/slam_system.h"
 #include "small_room.h"
 #include "whole_run.h"
@@ -269,6 +270,34 @@ TEST(OfflineResetTest, TheSameImagesGiveTheSameBytesAgain) {
   ASSERT_GT(trajectories[0].size(), 10u);
   for (size_t i = 0; i < trajectories[0].size(); ++i) {
     EXPECT_EQ(trajectories[0][i].world_from_cam, trajectories[1][i].world_from_cam) << i;
+  }
+}
+
+// Frames are counted anew, so nothing may be asked of the keyframe before the reset.
+TEST(OfflineResetTest, ALoadedMapGrowsAsItDoesInANewSystem) {
+  const SmallRoom& room = SmallRoom::Get();
+  SlamSystem system(SmallRoom::SmallCamera(), SmallRoom::CheapOptions());
+  const auto run = [&room](SlamSystem& of) {
+    for (int i = 0; i < kFrames; ++i) of.Process(room.Stamp(i), room.image(i));
+    of.Finish();
+    return of.FrameTrajectory();
+  };
+  run(system);
+  const std::string bytes = EncodeMap(system.camera(), *system.map().Read());
+  system.Reset();
+  system.LoadMap(DecodeMap(bytes, "first run"), "first run");
+  const Trajectory after_reset = run(system);
+
+  SlamSystem fresh(SmallRoom::SmallCamera(), SmallRoom::CheapOptions());
+  fresh.LoadMap(DecodeMap(bytes, "first run"), "first run");
+  const Trajectory in_fresh = run(fresh);
+
+  const auto keyframes = [](const SlamSystem& of) { return of.map().Read()->keyframes().CreatedCount(); };
+  EXPECT_EQ(keyframes(system), keyframes(fresh));
+  ASSERT_EQ(after_reset.size(), in_fresh.size());
+  ASSERT_GT(after_reset.size(), 10u);
+  for (size_t i = 0; i < after_reset.size(); ++i) {
+    EXPECT_EQ(after_reset[i].world_from_cam, in_fresh[i].world_from_cam) << i;
   }
 }
 

@@ -1,5 +1,6 @@
 // `dynamic_slam run` on a bag: offline, every image, without a roscore.
 
+#include <csignal>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -18,6 +19,10 @@
 
 namespace dynamic_slam {
 namespace {
+
+constexpr int kExitInterrupted = 130;
+
+volatile std::sig_atomic_t interrupted = 0;
 
 struct Arguments {
   std::string bag, out, topic, camera_topic, camera, config, detector = "none", models;
@@ -38,6 +43,7 @@ Camera ChooseCamera(const Arguments& arguments, const FrameSource& source) {
 }
 
 int Run(const Arguments& arguments) {
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
   SystemOptions options;
   if (!arguments.config.empty()) LoadOptions(FindConfig("profiles", "options", arguments.config), &options);
   ApplySet(&options, arguments.assignments);
@@ -48,13 +54,16 @@ int Run(const Arguments& arguments) {
       arguments.out.empty() ? std::filesystem::path("out") / std::filesystem::path(arguments.bag).stem()
                             : std::filesystem::path(arguments.out);
   PrepareOutputFolder(out);
-  RunSummary summary = RunSequence(*source, system);
+  RunControl control;
+  control.should_stop = [] { return interrupted != 0; };
+  RunSummary summary = RunSequence(*source, system, control);
   summary.source = arguments.bag;
+  // Whatever ended the run, what it has so far is kept.
+  if (!summary.frames.empty()) WriteResults(out, system, summary);
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
-  WriteResults(out, system, summary);
   fmt::print("{} of {} images have a pose\nresults: {}\n", system.FrameTrajectory().size(),
              summary.frames_total, out.string());
-  return 0;
+  return summary.interrupted ? kExitInterrupted : 0;
 }
 
 }  // namespace
@@ -69,7 +78,9 @@ int main(int argc, char** argv) {
   app.add_option("--camera-topic", a.camera_topic, "Topic of the calibration (default: the only one)");
   app.add_option("--camera", a.camera, "Name of a known camera, or camera file, instead of the calibration");
   app.add_option("--config", a.config, "YAML file with options, or a profile");
-  app.add_option("--set", a.assignments, "One option, key=value; may be repeated")->type_name("KEY=VALUE");
+  app.add_option("--set", a.assignments, "One option, key=value; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);  // else it takes BAG
   app.add_option("--detector", a.detector, "Object detector: " + dynamic_slam::DetectorHelp())
       ->capture_default_str();
   app.add_option("--models", a.models, "Folder in which network files are looked for too");

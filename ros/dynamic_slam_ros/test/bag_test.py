@@ -1,9 +1,12 @@
 """Bags: what make_bag writes, and that bag_runner makes of it what `dynamic_slam run` makes of the images."""
 
+import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time as time_module
 import unittest
 
 import walk_film
@@ -11,6 +14,7 @@ from walk_film import run
 
 try:
     import rosbag
+    import rospy
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
@@ -92,6 +96,29 @@ class BagTest(unittest.TestCase):
                 out.write("/right", message, time)
         self.expect_refusal(two, "not clear which topic", "/left, /right", "--topic")
         self.expect_refusal(two, "has no sensor_msgs/CameraInfo", "--camera", options=("--topic", "/left"))
+
+    def test_an_interrupt_keeps_what_there_is(self):
+        rounds = 30
+        long = self.path("long.bag")
+        with rosbag.Bag(self.bag) as bag, rosbag.Bag(long, "w") as out:
+            messages = list(bag.read_messages())
+            for i in range(rounds):
+                for topic, message, time in messages:
+                    message.header.stamp += rospy.Duration(0 if i == 0 else 2)
+                    out.write(topic, message, time + rospy.Duration(2 * i))
+        runner = subprocess.Popen([self.tool("bag_runner"), long, *self.detector, "--out", self.path("interrupted")],
+                                  stdout=subprocess.DEVNULL)
+        while runner.poll() is None and not os.path.isdir(self.path("interrupted")):
+            time_module.sleep(0.01)
+        time_module.sleep(1)
+        runner.send_signal(signal.SIGINT)
+        self.assertEqual(runner.wait(timeout=60), 130)
+        with open(self.path("interrupted", "summary.json"), encoding="utf-8") as file:
+            summary = json.load(file)
+        self.assertTrue(summary["interrupted"])
+        self.assertGreater(summary["frames_total"], 0)
+        self.assertLess(summary["frames_total"], rounds * FRAMES)
+        self.assertTrue(os.path.exists(self.path("interrupted", "trajectory.txt")))
 
     def test_damaged_messages_cost_one_frame_each(self):
         damaged = self.path("damaged.bag")

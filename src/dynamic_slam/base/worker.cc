@@ -1,27 +1,14 @@
 #include "dynamic_slam/base/worker.h"
 
-#include <algorithm>
 #include <atomic>
 #include <utility>
 
-#ifdef __linux__
-#include <sys/resource.h>
-#include <unistd.h>
-#endif
+#include "dynamic_slam/base/thread_priority.h"
 
 namespace dynamic_slam {
 namespace {
 
 std::atomic<int> abandoned_count = 0;
-
-// Linux, against POSIX, has a niceness for each thread, and any thread may raise its own.
-void GiveWayToOthers() {
-#ifdef __linux__
-  constexpr int kNiceness = 10;  // the scheduler weighs it 110, and 0 1024
-  const id_t thread = static_cast<id_t>(gettid());
-  setpriority(PRIO_PROCESS, thread, std::max(kNiceness, getpriority(PRIO_PROCESS, thread)));
-#endif
-}
 
 }  // namespace
 

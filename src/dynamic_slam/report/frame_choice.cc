@@ -40,7 +40,7 @@ void FrameChoice::Watch(const RunProgress& progress) {
   preparer_.PrepareColour(progress.image->image, &chosen.picture);
   DrawFrame(progress, &chosen.picture);
   const TrackingResult& tracking = progress.result->tracking;
-  chosen.caption = fmt::format("frame {}: {}, {} of {} keypoints in dynamic boxes", progress.frame - 1,
+  chosen.caption = fmt::format("frame {}: {}, {} of {} points in dynamic boxes", progress.frame - 1,
                                Name(tracking.state), tracking.dynamic.InBoxes(), tracking.keypoints);
 }
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "dynamic_slam/base/guarded.h"
 #include "dynamic_slam/io/box_file.h"
 #include "dynamic_slam/semantics/detector.h"
 
@@ -14,21 +15,22 @@ class RecordingDetector : public Detector {
   explicit RecordingDetector(std::shared_ptr<Detector> detector)
       : Detector(detector->name(), detector->class_names()), detector_(std::move(detector)) {}
 
-  // In the order of the images. To be read when the run has ended.
-  const std::vector<BoxRecord>& records() const { return records_; }
+  // In the order of the images, as far as it came; it may still be at work when the run has ended.
+  std::vector<BoxRecord> records() const { return *records_.Read(); }
 
  private:
   std::vector<Detection> Find(const cv::Mat& image, FrameId frame, double timestamp_s) override {
     std::vector<Detection> detections = detector_->Detect(image, frame, timestamp_s);
+    const auto records = records_.Write();
     for (const Detection& detection : detections) {
-      records_.push_back({timestamp_s, class_names()[static_cast<size_t>(detection.class_id)],
+      records->push_back({timestamp_s, class_names()[static_cast<size_t>(detection.class_id)],
                           detection.score, 1, detection.box});
     }
     return detections;
   }
 
   std::shared_ptr<Detector> detector_;
-  std::vector<BoxRecord> records_;
+  Guarded<std::vector<BoxRecord>> records_;
 };
 
 }  // namespace dynamic_slam

@@ -1,5 +1,6 @@
 #include "dynamic_slam/semantics/dynamic_prior.h"
 
+#include <cctype>
 #include <optional>
 
 #include <yaml-cpp/yaml.h>
@@ -31,7 +32,13 @@ std::optional<double> ParseScore(const YAML::Node& node) {
 }  // namespace
 
 double DynamicPrior::Score(std::string_view class_name) const {
-  const auto found = score_of_class.find(class_name);
+  auto found = score_of_class.find(class_name);
+  if (found == score_of_class.end()) {
+    // KITTI, VisDrone and Open Images write "Person" and "Car".
+    std::string lower(class_name);
+    for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    found = score_of_class.find(lower);
+  }
   return found == score_of_class.end() ? other_score : found->second;
 }
 

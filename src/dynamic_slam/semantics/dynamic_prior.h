@@ -10,7 +10,8 @@
 namespace dynamic_slam {
 
 // How dynamic the objects of each class are by experience (section 3.2 and Fig. 4): scores from 0 (static) to
-// kMaxScore (dynamic). Classes go by name, as each detector numbers them in its own way.
+// kMaxScore (dynamic). Classes go by name, as each detector numbers them in its own way; a name in capitals
+// also by that in lower case.
 struct DynamicPrior {
   static constexpr double kMaxScore = 10;
 

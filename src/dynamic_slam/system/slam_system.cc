@@ -7,8 +7,11 @@
 #include <tuple>
 #include <utility>
 
+#include <opencv2/core/utility.hpp>
+
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/thread_priority.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 
@@ -25,6 +28,12 @@ bool IsSameCamera(const Camera& a, const Camera& b) {
     return std::tuple(c.width, c.height, c.model, c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4);
   };
   return numbers(a) == numbers(b);
+}
+
+// The threads that OpenCV keeps for images serve the detector as well. Started by tracking, they would
+// inherit its priority, and keep it.
+void StartImageThreads() {
+  cv::parallel_for_(cv::Range(0, 4 * std::max(1, cv::getNumThreads())), [](const cv::Range&) {});
 }
 
 const SystemOptions& Checked(const SystemOptions& options) {
@@ -50,6 +59,7 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       mapper_(camera(), options.mapper, &map_),
       loop_closer_(camera(), options.loop, options.seed, &map_),
       executor_(std::move(executor)) {
+  if (mode_ == RunMode::kRealtime) StartImageThreads();
   if (mode_ == RunMode::kOffline && options_.backfill) {
     backfiller_.emplace(camera(), options_.tracker, options_.seed, &map_);
   }
@@ -62,6 +72,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   DS_TRACE("frame");
   DS_CHECK(!is_stopped_, "the system was stopped: Reset() first");
   executor_->ThrowIfFailed();
+  const UrgentSection urgent(mode_ == RunMode::kRealtime);
   FrameResult result;
   const auto start = std::chrono::steady_clock::now();
   preparer_.Prepare(image, &grey_);

@@ -130,6 +130,11 @@ void Tracker::AcceptPose() {
   localiser_.Anchor(&frame_);
   velocity_.reset();
   if (!last_has_pose_) return;
+  if (frame_.reference != last_.reference) {
+    // Found again in another part, with an origin and a unit of its own?
+    const auto map = map_->Read();
+    if (map->PartOf(last_.reference) != map->PartOf(frame_.reference)) return;
+  }
   velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
   velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
   if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
@@ -234,7 +239,11 @@ void Tracker::ForgetPose() {
 void Tracker::Reset() {
   map_->Write()->Reset();
   ForgetPose();
-  frame_.reference = last_.reference = KeyframeId();  // those of the map that is gone
+  // Those of the map that is gone; and frames are counted anew.
+  frame_.reference = last_.reference = last_keyframe_ = KeyframeId();
+  last_keyframe_frame_ = FrameId();
+  start_part_ = PartId();
+  most_inliers_ = 0;
   initializer_.Reset();
   filter_.Reset();
   share_in_boxes_ = 0;

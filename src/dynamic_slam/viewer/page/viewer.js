@@ -4,7 +4,7 @@
 const HELLO = 1, FRAME = 2, MAP = 3, EVENT = 4, PLAYER = 5, HEADER = 12;
 const STATES = ["initialising", "tracking", "lost"];
 const STATE_COLOURS = ["#f2b84b", "#3ddc84", "#ff5a4f"];
-const MAX_EVENTS = 200, SEEK_MS = 120, SHARED_MS = 200;
+const MAX_EVENTS = 200, SEEK_MS = 120;
 
 const $ = (id) => document.getElementById(id);
 const page = {live: null, map: null, video: null, hello: {}, paused: false, lastSeek: 0, seekTimer: 0, events: 0, scrubbing: false, newest: null, frameTimer: 0, lastFrame: 0, sharesProcessors: false};
@@ -130,7 +130,7 @@ function onMessage(buffer) {
 // Shows the frame, or, where processors are shared, the newest one when it is time.
 function onFrame(buffer) {
   page.newest = buffer;
-  const wait = page.sharesProcessors ? page.lastFrame + SHARED_MS - performance.now() : 0;
+  const wait = page.sharesProcessors ? page.lastFrame + 1000 * SHARED_S - performance.now() : 0;
   if (wait <= 0) showNewest();
   else if (!page.frameTimer) page.frameTimer = setTimeout(showNewest, wait);
 }
