@@ -1,7 +1,10 @@
 #include "dynamic_slam/geometry/homography.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
@@ -102,6 +105,57 @@ std::vector<Rigid3> PosesFromHomography(const Eigen::Matrix3d& second_H_first, d
     poses.emplace_back(R, -t);
   }
   return poses;
+}
+
+namespace {
+
+// n with n^T x = 1 on the plane: where the inverse depth is nearest to linear in the image, so that points
+// count by what the images say of them. Those far from it count less.
+std::optional<Eigen::Vector3d> FitPlane(std::span<const Eigen::Vector3d> points) {
+  constexpr int kRounds = 5;
+  constexpr size_t kMinPoints = 8;
+  if (points.size() < kMinPoints) return std::nullopt;
+  Eigen::Vector3d plane = Eigen::Vector3d::Zero();
+  std::vector<double> residuals(points.size()), sorted;
+  double scale = std::numeric_limits<double>::infinity();  // all count the same in the first round
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3d ray = points[i] / points[i].z();
+      const double relative = residuals[i] / scale, weight = 1 / (1 + relative * relative);
+      normal += weight * ray * ray.transpose();
+      right += weight * ray / points[i].z();
+    }
+    const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
+    if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-9)) return std::nullopt;
+    plane = solver.solve(right);
+    for (size_t i = 0; i < points.size(); ++i)
+      residuals[i] = std::abs(plane.dot(points[i]) - 1) / points[i].z();
+    sorted = residuals;
+    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+    scale = sorted[sorted.size() / 2];
+    if (!(scale > 1e-12 * plane.norm())) break;  // on the plane
+  }
+  return plane;
+}
+
+}  // namespace
+
+std::optional<Rigid3> TwinMotion(const Rigid3& second_from_first,
+                                 std::span<const Eigen::Vector3d> points_in_first) {
+  const auto plane = FitPlane(points_in_first);
+  if (!plane) return std::nullopt;
+  const Eigen::Matrix3d H = second_from_first.Matrix() + second_from_first.translation * plane->transpose();
+  std::optional<Rigid3> twin;
+  double farthest_rad = 1e-4;  // the motion itself, as it comes back
+  for (const Rigid3& pose : PosesFromHomography(H)) {
+    const double angle_rad = RotationAngle(pose.rotation, second_from_first.rotation);
+    if (angle_rad <= farthest_rad || pose.translation.squaredNorm() == 0) continue;
+    farthest_rad = angle_rad;
+    twin = pose;
+  }
+  return twin;
 }
 
 }  // namespace dynamic_slam

@@ -149,6 +149,39 @@ TEST(Homography, OfARotationHasNoTranslation) {
   EXPECT_LT(RotationAngle(poses[0].rotation, rotation), 1e-9);
 }
 
+TEST(Homography, TheTwinOfAMotionSeesThePlaneAlike) {
+  Random random(8);
+  const Eigen::Vector3d plane = Eigen::Vector3d(0.1, -0.2, -1) / -2.0;
+  const Rigid3 motion(ExpSo3({0.02, -0.1, 0.02}), Eigen::Vector3d(-0.4, 0.1, 0.05).normalized());
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d ray(random.Uniform(-0.5, 0.5), random.Uniform(-0.4, 0.4), 1);
+    // A tenth is far from the plane.
+    points.push_back(ray * (i % 10 == 0 ? random.Uniform(3, 9) : 1 / plane.dot(ray)));
+  }
+  const auto twin = TwinMotion(motion, points);
+  ASSERT_TRUE(twin);
+  EXPECT_NEAR(twin->translation.norm(), 1, 1e-9);
+  EXPECT_GT(Degrees(RotationAngle(twin->rotation, motion.rotation)), 1);
+  const Eigen::Matrix3d E = EssentialFromPose(*twin);
+  for (size_t i = 0; i < points.size(); ++i) {
+    const double error = std::abs((motion * points[i]).normalized().dot(E * points[i].normalized()));
+    if (i % 10 == 0) {
+      EXPECT_GT(error, 1e-4) << i;
+    } else {
+      EXPECT_LT(error, 1e-6) << i;
+    }
+  }
+  const auto back = TwinMotion(*twin, std::vector<Eigen::Vector3d>());
+  EXPECT_FALSE(back) << "no points";
+}
+
+TEST(Homography, APlaneApproachedHeadOnHasNoTwin) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 64; ++i) points.emplace_back(i % 8 - 4, i / 8 - 4, 5);
+  EXPECT_FALSE(TwinMotion(Rigid3(ExpSo3({0, 0, 0}), {0, 0, -1}), points));
+}
+
 TEST(P3p, FindsTheTruthAmongItsSolutions) {
   Random random(8);
   int missed = 0;

@@ -306,8 +306,17 @@ bool AreDifferent(const Rigid3& a, const Rigid3& b) {
   return RotationAngle(a.rotation, b.rotation) > 0.02 || ParallaxAngle(a.translation, b.translation) > 0.1;
 }
 
+std::optional<Rigid3> TwinOf(const Reconstruction& found) {
+  std::vector<Eigen::Vector3d> points;
+  for (size_t i = 0; i < found.points_in_first.size(); ++i) {
+    if (found.is_triangulated[i] != 0) points.push_back(found.points_in_first[i]);
+  }
+  return TwinMotion(found.second_from_first, points);
+}
+
 TwoViewMotion TakeMotion(Reconstruction&& from) {
-  return {from.second_from_first, std::move(from.is_triangulated), std::move(from.points_in_first), from.triangulated};
+  return {from.second_from_first, std::move(from.is_triangulated), std::move(from.points_in_first),
+          from.triangulated};
 }
 
 }  // namespace
@@ -369,8 +378,7 @@ TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vecto
   }
   std::vector<Reconstruction> tried;
   const auto by_score = [](const Reconstruction& a, const Reconstruction& b) { return a.score < b.score; };
-  for (const Rigid3& origin : origins) {
-    if (origin.translation.squaredNorm() == 0) continue;
+  const auto try_motions_near = [&](const Rigid3& origin) {
     const Rigid3 refined = estimator.Refine(matches.pairs, origin, 10);
     const auto begin = static_cast<std::ptrdiff_t>(tried.size());
     for (const Rigid3& motion : PosesFromEssential(EssentialFromPose(refined))) {
@@ -384,8 +392,15 @@ TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vecto
     }
     const Rigid3 cleaned = estimator.Refine(in_front, one.second_from_first, 10);
     one = Reconstruct(camera, matches, estimator.RelativeErrors(cleaned), cleaned, options);
+  };
+  for (const Rigid3& origin : origins) {
+    if (origin.translation.squaredNorm() != 0) try_motions_near(origin);
   }
   if (tried.empty()) return fail(TwoViewFailure::kLowParallax, 0, options.min_parallax_deg);
+  // Which of two motions the samples find is chance, so ask for the other one: a motion is only certain when
+  // that does not fit.
+  if (const auto twin = TwinOf(*std::max_element(tried.begin(), tried.end(), by_score)))
+    try_motions_near(*twin);
   std::stable_sort(tried.begin(), tried.end(),
                    [](const Reconstruction& a, const Reconstruction& b) { return a.score > b.score; });
   Reconstruction& best = tried.front();
@@ -410,7 +425,8 @@ TwoViewResult EstimateTwoView(const Camera& camera, std::span<const Eigen::Vecto
   result.motion = TakeMotion(std::move(best));
   if (rivalry > options.max_second_best_ratio) {
     for (Reconstruction* rival : rivals) {
-      if (rival->score > options.max_second_best_ratio * best_score) result.rivals.push_back(TakeMotion(std::move(*rival)));
+      if (rival->score > options.max_second_best_ratio * best_score)
+        result.rivals.push_back(TakeMotion(std::move(*rival)));
     }
     return fail(TwoViewFailure::kAmbiguous, rivalry, options.max_second_best_ratio);
   }

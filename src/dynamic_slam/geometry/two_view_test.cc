@@ -41,7 +41,8 @@ Errors RunSeeds(const Camera& camera, const Rigid3& truth, const std::function<M
     errors.from_homography += result.from_homography;
     if (!result.Succeeded()) continue;
     ++errors.successes;
-    errors.rotation_deg.push_back(Degrees(RotationAngle(result.motion.second_from_first.rotation, truth.rotation)));
+    errors.rotation_deg.push_back(
+        Degrees(RotationAngle(result.motion.second_from_first.rotation, truth.rotation)));
     errors.translation_deg.push_back(
         Degrees(ParallaxAngle(result.motion.second_from_first.translation, truth.translation)));
     EXPECT_NEAR(result.motion.second_from_first.translation.norm(), 1, 1e-12);
@@ -143,6 +144,30 @@ TEST(TwoView, PlaneIsRecognisedAndItsMotionFound) {
     }
     EXPECT_LT(Errors::Max(e.rotation_deg), 0.6);
     EXPECT_LT(Errors::Max(e.translation_deg), 2.5);
+  }
+}
+
+TEST(TwoView, CloseToAPlaneTheTruthIsAlwaysAmongTheMotions) {
+  const Camera camera = TestCamera();
+  const Rigid3 truth(ExpSo3({0.02, -0.1, 0.02}), Eigen::Vector3d(-0.2, 0.05, 0.02));
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.3, -0.5, -1).normalized();
+  for (int seed = 0; seed < 100; ++seed) {
+    Random random(1000 + 17 * seed);
+    const MatchSet set =
+        MakeMatches(camera, truth, 300, 0.7, random, [&](const Eigen::Vector2d& px, Random& r) {
+          return -1.6 / normal.dot(camera.Unproject(px)) * (1 + 0.05 * r.Uniform(-1, 1));
+        });
+    const TwoViewResult result = EstimateTwoView(camera, set.first_px, set.second_px, {}, random);
+    ASSERT_TRUE(result.Succeeded() || result.failure == TwoViewFailure::kAmbiguous) << Explain(result);
+    double nearest_deg = 180;
+    const auto compare = [&](const TwoViewMotion& motion) {
+      nearest_deg = std::min(nearest_deg,
+                             Degrees(ParallaxAngle(motion.second_from_first.translation, truth.translation)));
+    };
+    compare(result.motion);
+    for (const TwoViewMotion& rival : result.rivals) compare(rival);
+    EXPECT_LT(nearest_deg, 12) << seed << ": " << Explain(result) << ", " << result.rivals.size()
+                               << " rivals";
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "dynamic_slam/base/dispatch.h"
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
 namespace {
@@ -245,6 +246,7 @@ void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {
   DS_CHECK(from != into, "id={}", from.value());
   const std::vector<Observation> observations = landmarks_.At(from).observations_;
   const int found = landmarks_.At(from).found_count, visible = landmarks_.At(from).visible_count;
+  const float static_log_odds = landmarks_.At(from).static_log_odds;
   EraseLandmark(from);
   Landmark& survivor = landmarks_.At(into);
   for (const Observation& observation : observations) {
@@ -252,6 +254,9 @@ void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {
   }
   survivor.found_count += found;
   survivor.visible_count += visible;
+  // Evidence of one point, from different sightings.
+  survivor.static_log_odds =
+      std::clamp(survivor.static_log_odds + static_log_odds, -kMaxStaticLogOdds, kMaxStaticLogOdds);
   if (merged_into_.size() <= from.value()) merged_into_.resize(from.value() + 1);
   merged_into_[from.value()] = into;
   RefreshLandmark(into);

@@ -79,7 +79,10 @@ TEST(MapTest, MergedLandmarksResolveToTheSurvivor) {
   const LandmarkId first = AddLandmark(&map, {{a, 0}, {b, 0}});
   const LandmarkId second = AddLandmark(&map, {{b, 1}, {c, 1}});
   const LandmarkId third = AddLandmark(&map, {{c, 2}, {d, 2}});
+  map.landmarks().At(first).static_log_odds = 1.5f;
+  map.landmarks().At(second).static_log_odds = -0.5f;
   map.MergeLandmarks(second, first);
+  EXPECT_FLOAT_EQ(map.landmarks().At(first).static_log_odds, 1) << "evidence of both";
   map.MergeLandmarks(first, third);
   EXPECT_EQ(map.Resolve(second), third);
   EXPECT_EQ(map.Resolve(first), third);

@@ -139,10 +139,12 @@ std::vector<LandmarkProposal> LandmarkFactory::Propose(const Map& map, KeyframeI
   const FreeKeypoints theirs = CollectFree(neighbour, scales);
   for (size_t i = 0; i < mine.indices.size(); ++i) {
     const Eigen::Vector3d ray = camera_.Unproject({mine.x[i], mine.y[i]});
-    const Eigen::Vector3d near =
-        rotation * (kNearestDepthRatio * median_depth * ray) + neighbour_from_keyframe.translation;
     const Eigen::Vector3d far = rotation * ray;
-    if (near.z() <= 0 || far.z() <= 0) continue;
+    if (far.z() <= 0) continue;
+    // Nearest to both: a neighbour ahead has passed the start of the ray.
+    const double nearest = kNearestDepthRatio * median_depth;
+    const double depth = std::max(nearest, (nearest - neighbour_from_keyframe.translation.z()) / far.z());
+    const Eigen::Vector3d near = depth * far + neighbour_from_keyframe.translation;
     const Eigen::Vector2d near_px = camera_.Project(near), far_px = camera_.Project(far);
     const Eigen::Vector2d span = far_px - near_px;
     const double length = span.norm();

@@ -106,6 +106,22 @@ TEST(LandmarkFactoryTest, NothingIsMadeBehindTheCamera) {
   EXPECT_LE(CreateLandmarks(&two).size(), 2u);
 }
 
+// Keyframes that go on with their back to where they go: the neighbour is ahead, and has passed the start of
+// each ray.
+TEST(LandmarkFactoryTest, ANeighbourAheadIsSearchedToo) {
+  SyntheticWorld world(kPoints);
+  for (const double step : {0.7, -0.7}) {
+    SyntheticMap scene(&world);
+    const KeyframeId first = scene.Add(Rigid3());
+    const KeyframeId second = scene.Add(Rigid3(ExpSo3({0, 0, 0}), {0.2, 0, -step}));
+    scene.AddLandmarks(0, kPoints / 4, {first, second});
+    MapperOptions options;
+    options.min_parallax_deg = 0.1;
+    const LandmarkFactory factory(world.camera(), options);
+    EXPECT_GT(factory.Propose(scene.map, second, first).size(), 100u) << step;
+  }
+}
+
 TEST(LandmarkFusionTest, DuplicatesBecomeOne) {
   SyntheticWorld world(300);
   SyntheticMap scene(&world);
@@ -187,6 +203,40 @@ TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
     const Eigen::Vector3d center = scene.map.keyframes().At(ids[i]).CenterInWorld() / unit;
     EXPECT_LT((center - Eigen::Vector3d(0.2 * static_cast<double>(i), 0, 0)).norm(), 0.003) << i;
   }
+  EXPECT_THAT(scene.map.Validate(), IsEmpty());
+}
+
+TEST(MapBundleTest, WhatCameMeanwhileMovesAlong) {
+  SyntheticWorld world(400);
+  SyntheticMap scene(&world);
+  std::vector<KeyframeId> ids;
+  for (int i = 0; i < 5; ++i) ids.push_back(scene.Add(SidewaysPose(0.2 * i)));
+  scene.AddLandmarks(0, 300, ids);
+  Rigid3 pose = scene.map.keyframes().At(ids[4]).cam_from_world();
+  pose.translation += Eigen::Vector3d(0.05, 0, 0);
+  scene.map.keyframes().At(ids[4]).set_cam_from_world(pose);
+
+  LandmarkId younger;
+  const Eigen::Vector3d x_in_cam(0.1, 0.2, 3);
+  const auto free_keypoint = [&](KeyframeId id) {
+    const auto& landmarks = scene.map.keyframes().At(id).landmarks();
+    return static_cast<uint32_t>(std::find(landmarks.begin(), landmarks.end(), LandmarkId()) -
+                                 landmarks.begin());
+  };
+  const auto add_one = [&] {
+    if (younger.IsValid()) return false;
+    const auto map = scene.shared_map.Write();
+    younger =
+        map->AddLandmark(map->keyframes().At(ids[4]).cam_from_world().Inverse() * x_in_cam, ids[4]).id();
+    for (const KeyframeId id : {ids[0], ids[4]}) map->Link(id, free_keypoint(id), younger);
+    map->RefreshLandmark(younger);
+    return false;
+  };
+  ASSERT_TRUE(AdjustAll(world.camera(), {}, add_one, &scene.shared_map).usable);
+  ASSERT_TRUE(younger.IsValid());
+  const Rigid3 after = scene.map.keyframes().At(ids[4]).cam_from_world();
+  EXPECT_GT((after.translation - pose.translation).norm(), 0.02) << "there was something to go along with";
+  EXPECT_LT((after * scene.map.landmarks().At(younger).position() - x_in_cam).norm(), 1e-9);
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
 }
 

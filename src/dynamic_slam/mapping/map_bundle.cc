@@ -97,6 +97,7 @@ class MapBundle {
   bool Move(Map* map) const {
     if (map->epoch() != epoch_ || map->revision() != revision_) return false;
     if (is_whole_) map->BeginRevision();
+    const std::vector<Younger> younger = YoungerLandmarks(*map);
     MoveYoungerKeyframes(map);
     for (size_t i = 0; i < keyframes_.size(); ++i) {
       if (problem_.poses[i].fixed) continue;
@@ -104,12 +105,34 @@ class MapBundle {
         keyframe->set_cam_from_world(problem_.poses[i].cam_from_world);
       }
     }
+    for (const Younger& one : younger) {
+      const Rigid3 world_from_keyframe = map->keyframes().At(one.seen_by).cam_from_world().Inverse();
+      map->landmarks().At(one.id).Transform(ToSim3(world_from_keyframe * one.keyframe_from_world));
+    }
     for (size_t i = 0; i < landmarks_.size(); ++i) {
       if (Landmark* landmark = map->landmarks().Find(landmarks_[i])) {
         landmark->set_position(problem_.points[i].position);
       }
     }
     return true;
+  }
+
+  // A landmark that came during the solution keeps its place relative to a keyframe that sees it.
+  struct Younger {
+    LandmarkId id;
+    KeyframeId seen_by;
+    Rigid3 keyframe_from_world;  // before anything moved
+  };
+
+  std::vector<Younger> YoungerLandmarks(const Map& map) const {
+    std::vector<Younger> younger;
+    for (uint32_t id = static_cast<uint32_t>(seen_.size()); id < map.landmarks().CreatedCount(); ++id) {
+      const Landmark* landmark = map.landmarks().Find(LandmarkId(id));
+      if (landmark == nullptr || landmark->observations().empty()) continue;
+      const KeyframeId seen_by = landmark->observations().back().keyframe;
+      younger.push_back({landmark->id(), seen_by, map.keyframes().At(seen_by).cam_from_world()});
+    }
+    return younger;
   }
 
   // The link may have gone with an earlier one of its landmark, or by others.

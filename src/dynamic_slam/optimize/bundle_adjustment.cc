@@ -105,7 +105,8 @@ BundleSummary Adjuster::Run() {
   BundleSummary summary;
   summary.initial_cost = RobustCost();
   summary.usable = Solve(/*robust=*/true, options_.max_iterations, &summary);
-  NameOutliers();
+  // Before its first step the problem may be far from what it becomes: nothing is known of any observation yet.
+  if (!summary.stopped || summary.iterations > 0) NameOutliers();
   if (summary.usable && !summary.stopped && options_.reject_outliers && options_.refine_iterations > 0) {
     // If this round fails, the values of the first one stand.
     Solve(/*robust=*/false, options_.refine_iterations, &summary);

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <limits>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/error.h"
@@ -196,6 +197,21 @@ TEST(AdjustBundle, StopsWhenToldAndKeepsTheStepsSoFar) {
   EXPECT_LT(result.summary.final_cost, result.summary.initial_cost);
   EXPECT_EQ(result.is_outlier.size(), problem.observations.size());
   EXPECT_TRUE(AllFinite(problem));
+}
+
+TEST(AdjustBundle, StoppedAtOnceItSaysNothingOfTheObservations) {
+  for (const int free_poses : {8, 250}) {  // of both solvers
+    Random random(7);
+    SyntheticBundleOptions scene;
+    scene.free_poses = free_poses;
+    scene.points = 20 * free_poses;
+    BundleProblem problem = SyntheticBundle(scene, &random, nullptr);
+    const Result result = Adjust(&problem, {}, [] { return true; });
+    EXPECT_TRUE(result.summary.stopped);
+    EXPECT_EQ(result.summary.iterations, 0);
+    EXPECT_EQ(result.summary.outliers, 0) << "far from what they become, most are off";
+    EXPECT_THAT(result.is_outlier, testing::Each(0));
+  }
 }
 
 TEST(AdjustBundle, WeightsDecideBetweenTwoExplanations) {

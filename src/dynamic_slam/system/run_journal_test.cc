@@ -76,7 +76,9 @@ TEST_F(RunJournalTest, CutOffAnywhereItTellsTheLinesBefore) {
     const RecoveredRun run = ReadJournal(folder_);
     EXPECT_EQ(run.frames, lines);
     EXPECT_EQ(run.trajectories.size(), lines > 0 ? 1u : 0u);
-    if (lines > 0) EXPECT_EQ(run.trajectories[0].size(), lines);
+    if (lines > 0) {
+      EXPECT_EQ(run.trajectories[0].size(), lines);
+    }
   }
 }
 
