@@ -95,6 +95,14 @@ TEST(LoopCloserTest, APartThatLooksTheSameIsNoPlace) {
               testing::Contains(Field(&LoopAttempt::reason, testing::HasSubstr("should be visible"))));
 }
 
+TEST(LoopCloserTest, WhatMoversHideIsNotMissed) {
+  // Somebody hides two thirds of the view, and of the rest a third looks the same.
+  TwoVisits visits(kDrift, 0.05, false, TwoVisits::kPoints / 3, 3 * TwoVisits::kPoints, 220);
+  const LoopResult result = visits.Close({.min_score_ratio = 0});
+  EXPECT_TRUE(result.corrected);
+  EXPECT_LT(visits.WorstCenter(), 0.02);
+}
+
 TEST(LoopCloserTest, OneKeyframeAloneIsNotBelieved) {
   TwoVisits visits(kDrift);
   const LoopResult result = visits.Close({.min_confirming_inliers = 1000});

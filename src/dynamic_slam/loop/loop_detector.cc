@@ -1,6 +1,7 @@
 #include "dynamic_slam/loop/loop_detector.h"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -24,6 +25,9 @@ constexpr size_t kNeighbours = 5;
 
 // About where the similarity of a few matches puts a landmark, and about where that of many does.
 constexpr double kFirstRadiusPx = 10, kSecondRadiusPx = 5;
+
+// About a pixel, in which keypoints tell who is to be seen there: two cells of their grid.
+constexpr float kHidingRadiusPx = 2 * KeypointGrid::kCellSizePx;
 
 double Median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -66,6 +70,18 @@ int UsableKeypoints(const Keyframe& keyframe) {
     usable += keyframe.StaticProbability(i) >= kMinStaticProbability;
   }
   return usable;
+}
+
+// Whether somebody who moves stands before what would be at the pixel: most of the keypoints about it are
+// theirs.
+bool IsHidden(const Keyframe& keyframe, const Eigen::Vector2d& px) {
+  int movers = 0, all = 0;
+  keyframe.grid().ForEachInWindow(static_cast<float>(px.x()), static_cast<float>(px.y()), kHidingRadiusPx, 0,
+                                  std::numeric_limits<int>::max(), [&](uint32_t i) {
+                                    ++all;
+                                    movers += keyframe.StaticProbability(i) < kMinStaticProbability;
+                                  });
+  return 2 * movers > all;
 }
 
 Eigen::Vector2d Pixel(const Keypoint& keypoint) { return {keypoint.x, keypoint.y}; }
@@ -310,6 +326,7 @@ std::vector<Loop::Link> LoopDetector::FindLandmarks(const Map& map, const Keyfra
                             landmark.max_distance(), &projection)) {
       continue;
     }
+    if (IsHidden(keyframe, projection.px)) continue;
     ++*visible;
     const double scale = map.octave_scales()[static_cast<size_t>(projection.octave)];
     const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),

@@ -16,19 +16,20 @@ struct TwoVisits {
   static constexpr int kPasses = 6;  // keyframes each time that the camera comes by
 
   // The second visit begins at `x`, and is seen through the drift; in a part of the map of its own, or not.
-  // Only some points look the same then.
+  // Only some points look the same then. Of `more_points` nobody makes landmarks. Of the second visit's
+  // keypoints those beyond a column of the image are on somebody who moves.
   explicit TwoVisits(const Sim3& drift, double second_x = 0.05, bool starts_anew = false,
-                     size_t same_points = kPoints)
-      : world(kPoints), map(&world) {
+                     size_t same_points = kPoints, int more_points = 0, float movers_from_px = 1e6)
+      : world(kPoints + more_points), map(&world) {
     for (int visit = 0; visit < 2; ++visit) {
       if (visit == 1) world.Repaint(same_points);
       const PartId part = visit == 0 || starts_anew ? map.map.BeginPart() : PartId(0);
       for (int i = 0; i < kPasses; ++i) {
         const double x = 0.1 * i + (visit == 0 ? first_x : first_x + second_x);
         truth.push_back(SidewaysPose(x));
-        ids[visit].push_back(map.Add(truth.back(), part));
+        ids[visit].push_back(map.Add(truth.back(), part, visit == 0 ? 1e6f : movers_from_px));
       }
-      map.AddLandmarks(0, static_cast<uint32_t>(world.size()), ids[visit]);
+      map.AddLandmarks(0, kPoints, ids[visit]);
     }
     map.map.landmarks().ForEach([&](Landmark& landmark) {
       if (landmark.created_by() == ids[1].back()) landmark.Transform(drift);

@@ -96,9 +96,14 @@ class SyntheticMap {
   explicit SyntheticMap(SyntheticWorld* world)
       : shared_map(SyntheticWorld::OctaveScales()), map(*shared_map.Write()), world_(world) {}
 
-  // A keyframe at the pose that sees no landmark yet.
-  KeyframeId Add(const Rigid3& cam_from_world, PartId part = PartId(0)) {
+  // A keyframe at the pose that sees no landmark yet. Its keypoints beyond a column of the image count as
+  // moving.
+  KeyframeId Add(const Rigid3& cam_from_world, PartId part = PartId(0), float movers_from_px = 1e6f) {
     views.push_back(world_->See(cam_from_world));
+    Frame& frame = views.back().frame;
+    for (const Keypoint& keypoint : frame.features.keypoints) {
+      frame.static_probability.push_back(keypoint.x < movers_from_px ? 1.0f : 0.0f);
+    }
     return InsertKeyframe(views.back().frame, &map, part);
   }
 
