@@ -320,6 +320,18 @@ class CliRunTest(unittest.TestCase):
         # Only in the margin around the box.
         self.assertLess(sum(map(int, left)), 0.2 * sum(map(int, before)))
 
+    def test_boxes_are_of_the_images_of_the_source(self):
+        """Whatever is made of the images first: true boxes, given as a detector's, are found where they are."""
+        walk = os.path.join(self.folder, "walk")
+        result = run_program("simulate", "office_walk", "--frames", "8", "--out", walk)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for options in (["resize_width=320"], ["crop_left=40", "crop_top=30", "crop_width=500", "resize_width=400"]):
+            out = os.path.join(self.folder, "prepared")
+            assignments = [part for option in options for part in ("--set", "image." + option)]
+            result = run_program("run", walk, "--detector", f"boxes:{walk}/boxes.csv", "--quiet", "--out", out, *assignments)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("Recall 100.0% and precision 100.0%", read(out, "report.html"), options)
+
     def test_masks_that_do_not_fit_are_input_errors(self):
         self.assert_input_error([self.room, "--masks", os.path.join(self.folder, "nowhere")], "nowhere", "no folder")
 
