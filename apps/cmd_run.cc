@@ -66,7 +66,7 @@ struct RunArguments {
 
 std::filesystem::path OutputFolder(const RunArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
-  if (IsLiveSource(arguments.source)) return "out/live";
+  if (IsLiveSource(arguments.source)) return LiveFolder("out", arguments.source);
   std::filesystem::path source = std::filesystem::absolute(arguments.source).lexically_normal();
   if (source.filename().empty()) source = source.parent_path();
   if (!std::filesystem::is_directory(source)) return std::filesystem::path("out") / source.stem();
@@ -224,6 +224,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::string source_name = WithoutPassword(arguments.source);
   const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
   const std::filesystem::path out = OutputFolder(arguments);
+  const bool is_named_by_us = arguments.out.empty() && IsLiveSource(arguments.source);
+  if (is_named_by_us) console.Say(fmt::format("results will be in {}", out.string()));
   std::optional<Trajectory> truth;
   if (!arguments.truth.empty()) truth = ReadGroundTruth(arguments.truth, arguments.source);
   const bool is_realtime = arguments.mode.empty() ? source->IsLive() : arguments.mode == "realtime";
@@ -264,6 +266,10 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     load_map();
   };
   RunJournal journal(out);
+  if (!journal.kept().empty()) {
+    console.Say(fmt::format("the journal of a run that was killed is kept: dynamic_slam recover {}",
+                            journal.kept().string()));
+  }
   Checkpoint checkpoint(arguments.save_map, arguments.save_map_every_min, console);
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);

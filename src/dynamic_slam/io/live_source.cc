@@ -1,5 +1,6 @@
 #include "dynamic_slam/io/live_source.h"
 
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <utility>
@@ -146,6 +147,28 @@ std::string WithoutPassword(std::string name) {
   if (at == std::string::npos) return name;
   const size_t colon = name.find(':', user);
   return colon < at ? name.replace(colon + 1, at - colon - 1, "***") : name;
+}
+
+std::filesystem::path LiveFolder(const std::filesystem::path& parent, const std::string& name) {
+  // Who asks and how is nobody's business: the host and the path only.
+  std::string stem = name;
+  if (const size_t scheme = name.find("://"); scheme != std::string::npos) {
+    stem = name.substr(scheme + 3, name.find_first_of("?#") - (scheme + 3));
+    stem.erase(0, stem.substr(0, stem.find('/')).rfind('@') + 1);
+  }
+  while (stem.ends_with('/')) stem.pop_back();
+  for (char& letter : stem) {
+    if (!std::isalnum(static_cast<unsigned char>(letter)) && letter != '.' && letter != '-') letter = '_';
+  }
+  stem.erase(0, stem.find_first_not_of("._"));
+  if (stem.empty()) stem = "live";
+  std::filesystem::path folder = parent / stem;
+  std::error_code ignored;
+  for (int i = 2; std::filesystem::exists(folder, ignored) && !std::filesystem::is_empty(folder, ignored);
+       ++i) {
+    folder = parent / fmt::format("{}_{}", stem, i);
+  }
+  return folder;
 }
 
 std::unique_ptr<FrameSource> MakeLiveSource(const std::string& name, std::unique_ptr<ImageGrabber> grabber,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -15,6 +16,10 @@ bool IsLiveSource(const std::string& name);
 
 // The name as it may be shown and kept: "rtsp://user:***@host/stream".
 std::string WithoutPassword(std::string name);
+
+// A folder below `parent` with the name of the source that is not there yet, or empty: what a camera saw
+// cannot be seen again, so that a later run must not write over it.
+std::filesystem::path LiveFolder(const std::filesystem::path& parent, const std::string& name);
 
 // Something that gives images for as long as it is there.
 class ImageGrabber {

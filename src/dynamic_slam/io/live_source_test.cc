@@ -116,6 +116,21 @@ TEST(LiveSourceNameTest, IsToldFromFiles) {
     EXPECT_FALSE(IsLiveSource(name)) << name;
 }
 
+TEST(LiveSourceNameTest, EachRunHasAFolderOfItsOwn) {
+  const auto parent = std::filesystem::path(testing::TempDir()) / "live_folders";
+  std::filesystem::remove_all(parent);
+  EXPECT_EQ(LiveFolder(parent, "camera:0"), parent / "camera_0");
+  std::filesystem::create_directories(parent / "camera_0");
+  EXPECT_EQ(LiveFolder(parent, "camera:0"), parent / "camera_0") << "it is empty";
+  std::filesystem::create_directories(parent / "camera_0" / "results");
+  EXPECT_EQ(LiveFolder(parent, "camera:0"), parent / "camera_0_2");
+  EXPECT_EQ(LiveFolder(parent, "camera:1"), parent / "camera_1");
+  EXPECT_EQ(LiveFolder(parent, "rtsp://me:s/e@cret@10.0.0.1:554/a/?token=b").parent_path(), parent);
+  EXPECT_EQ(LiveFolder(parent, "rtsp://me:secret@10.0.0.1:554/a/b?token=c"), parent / "10.0.0.1_554_a_b");
+  EXPECT_EQ(LiveFolder(parent, "http://../.."), parent / "live");
+  std::filesystem::remove_all(parent);
+}
+
 TEST(LiveSourceNameTest, IsShownWithoutThePassword) {
   EXPECT_EQ(WithoutPassword("rtsp://me:secret@10.0.0.1:554/a"), "rtsp://me:***@10.0.0.1:554/a");
   EXPECT_EQ(WithoutPassword("rtsp://me:s@cret@host/a@b"), "rtsp://me:***@host/a@b");
