@@ -30,6 +30,7 @@
 #include "dynamic_slam/system/run_journal.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
+#include "extra_output.h"
 #include "mask_folder.h"
 #include "overlay_writer.h"
 #include "run_console.h"
@@ -185,9 +186,14 @@ class FileWriter {
       write();
       return true;
     } catch (const std::exception&) {
-      if (failure_ == nullptr) failure_ = std::current_exception();
+      Note(std::current_exception());
       return false;
     }
+  }
+
+  // Something else could not be written, if that is not null.
+  void Note(const std::exception_ptr& failure) {
+    if (failure_ == nullptr) failure_ = failure;
   }
 
   // Throws what the first of them threw, if any did.
@@ -265,6 +271,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     system.Reset();
     load_map();
   };
+  ExtraOutput overlay_output("--overlay", console), masks_output("--export-masks", console),
+      recording_output("--record", console);
   RunJournal journal(out);
   if (!journal.kept().empty()) {
     console.Say(fmt::format("the journal of a run that was killed is kept: dynamic_slam recover {}",
@@ -280,9 +288,12 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     }
     checkpoint.SaveIfDue(system);
     recorder.Watch(progress);
-    if (overlay.has_value()) overlay->Write(progress);
-    if (masks.has_value()) masks->Write(*progress.image, *progress.result);
-    if (viewer.has_value()) viewer->Watch(progress, system, reset, control.should_stop);
+    if (overlay.has_value()) overlay_output.Try([&] { overlay->Write(progress); });
+    if (masks.has_value()) masks_output.Try([&] { masks->Write(*progress.image, *progress.result); });
+    if (viewer.has_value()) {
+      viewer->Watch(progress, system, reset, control.should_stop);
+      recording_output.Try([&] { viewer->CheckRecording(); });
+    }
   };
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = source_name;
@@ -294,22 +305,29 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const bool has_results = files.Try([&] { WriteResults(out, system, summary); });
   if (has_results) journal.Remove();
   const bool saves_map = !arguments.save_map.empty() && summary.failure == nullptr;
-  if (saves_map) files.Try([&] { WriteMapFile(arguments.save_map, system.camera(), *system.map().Read()); });
+  const bool has_map = saves_map && files.Try([&] {
+    WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
+  });
+  if (!arguments.save_map.empty() && !has_map)
+    console.Say(fmt::format("warning: the map is not saved: {}", arguments.save_map));
   if (arguments.truth.empty()) truth = FindTruth(arguments.source);
-  files.Try([&] {
+  const bool has_report = files.Try([&] {
     WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
   });
   PrintSummary(summary);
-  if (truth.has_value()) ReportTruth(*truth, system.FrameTrajectory(), out);
-  if (!arguments.trace.empty()) EndTrace(arguments.trace);
+  if (truth.has_value()) files.Try([&] { ReportTruth(*truth, system.FrameTrajectory(), out); });
+  if (!arguments.trace.empty()) files.Try([&] { EndTrace(arguments.trace); });
   if (!has_results)
     console.Say(fmt::format("Make space; dynamic_slam recover {} then writes the path.", out.string()));
-  if (summary.failure == nullptr) files.ThrowFailure();  // else that one is the cause
-  if (saves_map) fmt::print("map: {}\n", arguments.save_map);
-  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
+  if (has_map) fmt::print("map: {}\n", arguments.save_map);
+  if (has_results && has_report)
+    fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
   // After all results: a recording that cannot be written must not take them along.
-  if (viewer.has_value()) viewer->Finish(system);
-  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
+  if (viewer.has_value()) recording_output.Try([&] { viewer->Finish(system); });
+  for (const ExtraOutput* extra : {&overlay_output, &masks_output, &recording_output})
+    files.Note(extra->failure());
+  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);  // the cause of all else
+  files.ThrowFailure();
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
 
