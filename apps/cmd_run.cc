@@ -328,6 +328,10 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     files.Note(extra->failure());
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);  // the cause of all else
   files.ThrowFailure();
+  if (const std::string reason = source->EndReason(); !reason.empty()) {
+    throw InputError(source_name, reason,
+                     "These are the results up to then. Check cable, power and network.");
+  }
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
 
