@@ -3,6 +3,7 @@
 import glob
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -12,6 +13,8 @@ import unittest
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import cv2
+
+import docs_test
 
 PROGRAM = ""
 
@@ -96,6 +99,33 @@ class CliLiveTest(unittest.TestCase):
             self.assertIn(f"results will be in out/{folder}\n", result.stderr)
             with open(os.path.join(self.folder, "out", folder, "summary.json")) as file:
                 self.assertIn('"realtime"', file.read())
+
+    def calibrate_until(self, views, *, missing, images):
+        """Ctrl-C when so many views were told, and nothing is missing if that is asked for."""
+        camera = os.path.join(self.folder, "calibrated.yaml")
+        with subprocess.Popen([PROGRAM, "calibrate", self.stream(images, pause_s=0.3).url, "--board", "9x6", "--square",
+                               "0.025", "--out", camera], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                              text=True) as process:
+            for line in process.stdout:
+                if line.startswith("view ") and int(line.split()[1].rstrip(";")) >= views and (
+                        missing or line.endswith(": nothing\n")):
+                    process.send_signal(signal.SIGINT)
+                    break
+            output, errors = process.communicate(timeout=300)
+        return process.returncode, output, errors, camera
+
+    def test_ctrl_c_ends_a_capture_and_calibrates(self):
+        code, output, errors, camera = self.calibrate_until(12, missing=False, images=list(docs_test.board_images()))
+        self.assertEqual(code, 0, errors)
+        self.assertIn("camera    ", output)
+        self.assertTrue(os.path.exists(camera))
+        os.remove(camera)
+
+    def test_ctrl_c_too_early_says_what_is_missing(self):
+        code, _, errors, camera = self.calibrate_until(2, missing=True, images=list(docs_test.board_images())[:4])
+        self.assertEqual(code, 2, errors)
+        self.assertIn("and 8 are needed", errors)
+        self.assertFalse(os.path.exists(camera))
 
 
 if __name__ == "__main__":
