@@ -38,6 +38,7 @@
 #include "run_viewer.h"
 #include "source_arguments.h"
 #include "truth_report.h"
+#include "unmatched_inputs.h"
 
 namespace dynamic_slam {
 namespace {
@@ -249,15 +250,16 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   if (!arguments.save_map.empty()) CheckCanBeWritten(arguments.save_map);
   RunControl control = console.Control();
-  std::optional<MaskFolder> masks;
+  const cv::Size size(system.camera().width, system.camera().height);
+  std::optional<MaskFolder> masks, given_masks;
   if (!arguments.masks.empty()) {
-    control.mask = [folder =
-                        MaskFolder(arguments.masks, cv::Size(system.camera().width, system.camera().height))](
-                       const SourceImage& image) { return folder.Read(image); };
+    given_masks.emplace(arguments.masks, size);
+    control.mask = [folder = *given_masks](const SourceImage& image) { return folder.Read(image); };
   }
+  UnmatchedInputs unmatched(arguments.detector, given_masks, console);
   if (!arguments.export_masks.empty()) {
     PrepareOutputFolder(arguments.export_masks);
-    masks.emplace(arguments.export_masks, cv::Size(system.camera().width, system.camera().height));
+    masks.emplace(arguments.export_masks, size);
   }
   std::optional<OverlayWriter> overlay;
   if (!arguments.overlay.empty()) {
@@ -288,6 +290,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     }
     checkpoint.SaveIfDue(system);
     recorder.Watch(progress);
+    unmatched.Watch(*progress.image);
     if (overlay.has_value()) overlay_output.Try([&] { overlay->Write(progress); });
     if (masks.has_value()) masks_output.Try([&] { masks->Write(*progress.image, *progress.result); });
     if (viewer.has_value()) {
@@ -298,6 +301,7 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = source_name;
   console.End();
+  unmatched.Finish();
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   if (wanted_scale.has_value()) summary.scale = FindScale(*wanted_scale, system);
