@@ -327,7 +327,10 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (has_results && has_report)
     fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
   // After all results: a recording that cannot be written must not take them along.
-  if (viewer.has_value()) recording_output.Try([&] { viewer->Finish(system); });
+  if (viewer.has_value()) {
+    viewer->Finish(system);
+    recording_output.Try([&] { viewer->CheckRecording(); });
+  }
   for (const ExtraOutput* extra : {&overlay_output, &masks_output, &recording_output})
     files.Note(extra->failure());
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);  // the cause of all else

@@ -372,8 +372,6 @@ void LiveView::Finish(const SlamSystem& system) {
   }
   SendAgain(std::move(map));
   if (server_.has_value()) server_->Flush(std::chrono::milliseconds(1000));
-  CheckRecording();
-  if (recording_.has_value()) recording_->Flush();
 }
 
 }  // namespace dynamic_slam

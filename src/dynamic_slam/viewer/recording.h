@@ -13,16 +13,13 @@ namespace dynamic_slam {
 // The messages of a run in a file, each with the stamp of its image; docs/viewer.md has the bytes.
 inline constexpr char kRecordingName[] = "recording.view";
 
-// Throws InputError when the file cannot be made, and by Add and Flush when the disk is full.
+// Throws InputError when the file cannot be made, and by Add when the disk is full.
 class RecordingWriter {
  public:
   explicit RecordingWriter(std::filesystem::path file);
   void Add(double timestamp_s, const Message& message);
-  void Flush();
 
  private:
-  void Check() const;
-
   std::filesystem::path file_;
   std::ofstream stream_;
 };
