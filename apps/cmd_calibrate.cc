@@ -1,7 +1,10 @@
 #include "cmd_calibrate.h"
 
+#include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +19,8 @@
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/io/image_preparer.h"
+#include "dynamic_slam/io/live_source.h"
+#include "run_console.h"
 #include "source_arguments.h"
 
 namespace dynamic_slam {
@@ -44,12 +49,24 @@ ImagePreparer GreyPreparer(const cv::Size& size) {
   return ImagePreparer(any, {});
 }
 
-BoardViews FindViews(const Board& board, FrameSource* source) {
+// What cannot become a calibration is refused before anybody holds a board.
+void CheckEnoughImages(const std::string& name, const FrameSource& source, int max_frames) {
+  const size_t images = source.IsLive() ? static_cast<size_t>(max_frames) : source.FrameCount();
+  if (images == 0 || images >= kMinCalibrationViews) return;  // 0: not known
+  throw InputError(name, fmt::format("gives {} image{}", images, images == 1 ? "" : "s"),
+                   fmt::format("A calibration needs {} with the board in different places, and better {}.",
+                               kMinCalibrationViews, kEnoughViews));
+}
+
+// Ctrl-C ends the search; what was found until then counts.
+BoardViews FindViews(const Board& board, const RunConsole& console, FrameSource* source) {
   BoardViews views(source->ImageSize());
   ImagePreparer preparer = GreyPreparer(source->ImageSize());
   const size_t every = std::max<size_t>(1, source->FrameCount() / kMostImages);
   size_t images = 0, searched = 0, found = 0;
-  while (const std::optional<SourceImage> image = source->Next()) {
+  while (!console.ShouldStop()) {
+    const std::optional<SourceImage> image = source->Next();
+    if (!image.has_value()) break;
     if (images++ % every != 0) continue;
     ++searched;
     cv::Mat grey;
@@ -61,6 +78,7 @@ BoardViews FindViews(const Board& board, FrameSource* source) {
     // Whoever holds the board wants to know where next, and when it is enough.
     const std::string missing = BoardCoverage(views.views(), views.image_size()).Missing();
     fmt::print("view {}; not seen yet: {}\n", views.views().size(), missing.empty() ? "nothing" : missing);
+    std::fflush(stdout);
     if (missing.empty() && views.views().size() >= kEnoughViews) break;
   }
   fmt::print("images    {} of {} searched, board in {} of them, {} views that differ\n", searched, images,
@@ -98,9 +116,20 @@ void Print(const BoardCalibration& calibration) {
 
 void RunCalibrate(const CalibrateArguments& arguments) {
   const Board board = ParseBoard(arguments.board, arguments.square_m);
-  const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, arguments.source_options);
+  std::optional<RunConsole> console(true);  // a Ctrl-C after the capture ends the program
+  FrameSourceOptions source_options = arguments.source_options;
+  source_options.on_event = [&console](const std::string& event) { console->Say(event); };
+  source_options.should_stop = [&console] { return console->ShouldStop(); };
+  const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source, source_options);
+  CheckEnoughImages(WithoutPassword(arguments.source), *source, source_options.max_frames);
   CheckCanBeWritten(arguments.out);
-  const BoardViews views = FindViews(board, source.get());
+  if (source->IsLive()) {
+    fmt::print(
+        "hold the board before the camera, in all parts of the image, tilted each way; Ctrl-C ends it\n");
+    std::fflush(stdout);
+  }
+  const BoardViews views = FindViews(board, *console, source.get());
+  console.reset();
   const std::string picture = WriteCoverage(views, arguments.out);
   fmt::print("coverage  {}\n", picture);
   BoardCalibration calibration = CalibrateBoard(
@@ -124,8 +153,9 @@ void AddCalibrateCommand(CLI::App& app) {
   const auto arguments = std::make_shared<CalibrateArguments>();
   CalibrateArguments& a = *arguments;
   command
-      ->add_option("SOURCE", a.source,
-                   "Images of the board: folder, video, or camera:0, which ends when all was seen")
+      ->add_option(
+          "SOURCE", a.source,
+          "Images of the board: folder, video, or camera:0, which ends when all was seen, or at Ctrl-C")
       ->required();
   command->add_option("--board", a.board, "Inner corners of the board: 9x6 has 10 by 7 squares")
       ->required()

@@ -10,12 +10,23 @@
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/system/run_journal.h"
+#include "dynamic_slam/system/run_results.h"
 
 namespace dynamic_slam {
 namespace {
 
-void Recover(const std::filesystem::path& folder) {
-  const RecoveredRun run = ReadJournal(folder);
+// Of OUT/journal.1.csv, which a later run in OUT has kept, the results go to OUT/journal.1: those in OUT are
+// not its own.
+std::filesystem::path FolderFor(const std::filesystem::path& out_or_journal) {
+  if (!std::filesystem::is_regular_file(out_or_journal)) return out_or_journal;
+  if (out_or_journal.filename() == RunJournal::kFileName) return out_or_journal.parent_path();
+  return out_or_journal.parent_path() / out_or_journal.stem();
+}
+
+void Recover(const std::filesystem::path& out_or_journal) {
+  const RecoveredRun run = ReadJournal(out_or_journal);
+  const std::filesystem::path folder = FolderFor(out_or_journal);
+  if (!folder.empty()) PrepareOutputFolder(folder);
   WriteFileAtomically(folder / "frames.csv", run.frames_csv);
   WriteTrajectories(folder, run.trajectories);
   size_t poses = 0;
@@ -32,7 +43,10 @@ void AddRecoverCommand(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("recover", "Trajectory and frames of a run that was killed before it wrote them");
   const auto folder = std::make_shared<std::string>();
-  command->add_option("OUT", *folder, "Folder of its results, as --out had it")->required();
+  command
+      ->add_option("OUT", *folder,
+                   "Folder of its results, as --out had it, or a journal that a later run has kept there")
+      ->required();
   command->callback([folder] { Recover(*folder); });
 }
 

@@ -30,6 +30,7 @@
 #include "dynamic_slam/system/run_journal.h"
 #include "dynamic_slam/system/sequence_runner.h"
 #include "dynamic_slam/system/slam_system.h"
+#include "extra_output.h"
 #include "mask_folder.h"
 #include "overlay_writer.h"
 #include "run_console.h"
@@ -37,6 +38,7 @@
 #include "run_viewer.h"
 #include "source_arguments.h"
 #include "truth_report.h"
+#include "unmatched_inputs.h"
 
 namespace dynamic_slam {
 namespace {
@@ -66,7 +68,7 @@ struct RunArguments {
 
 std::filesystem::path OutputFolder(const RunArguments& arguments) {
   if (!arguments.out.empty()) return arguments.out;
-  if (IsLiveSource(arguments.source)) return "out/live";
+  if (IsLiveSource(arguments.source)) return LiveFolder("out", arguments.source);
   std::filesystem::path source = std::filesystem::absolute(arguments.source).lexically_normal();
   if (source.filename().empty()) source = source.parent_path();
   if (!std::filesystem::is_directory(source)) return std::filesystem::path("out") / source.stem();
@@ -185,9 +187,14 @@ class FileWriter {
       write();
       return true;
     } catch (const std::exception&) {
-      if (failure_ == nullptr) failure_ = std::current_exception();
+      Note(std::current_exception());
       return false;
     }
+  }
+
+  // Something else could not be written, if that is not null.
+  void Note(const std::exception_ptr& failure) {
+    if (failure_ == nullptr) failure_ = failure;
   }
 
   // Throws what the first of them threw, if any did.
@@ -224,6 +231,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const std::string source_name = WithoutPassword(arguments.source);
   const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
   const std::filesystem::path out = OutputFolder(arguments);
+  const bool is_named_by_us = arguments.out.empty() && IsLiveSource(arguments.source);
+  if (is_named_by_us) console.Say(fmt::format("results will be in {}", out.string()));
   std::optional<Trajectory> truth;
   if (!arguments.truth.empty()) truth = ReadGroundTruth(arguments.truth, arguments.source);
   const bool is_realtime = arguments.mode.empty() ? source->IsLive() : arguments.mode == "realtime";
@@ -241,15 +250,16 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   if (!arguments.trace.empty()) CheckCanBeWritten(arguments.trace);
   if (!arguments.save_map.empty()) CheckCanBeWritten(arguments.save_map);
   RunControl control = console.Control();
-  std::optional<MaskFolder> masks;
+  const cv::Size size(system.camera().width, system.camera().height);
+  std::optional<MaskFolder> masks, given_masks;
   if (!arguments.masks.empty()) {
-    control.mask = [folder =
-                        MaskFolder(arguments.masks, cv::Size(system.camera().width, system.camera().height))](
-                       const SourceImage& image) { return folder.Read(image); };
+    given_masks.emplace(arguments.masks, size);
+    control.mask = [folder = *given_masks](const SourceImage& image) { return folder.Read(image); };
   }
+  UnmatchedInputs unmatched(arguments.detector, given_masks, console);
   if (!arguments.export_masks.empty()) {
     PrepareOutputFolder(arguments.export_masks);
-    masks.emplace(arguments.export_masks, cv::Size(system.camera().width, system.camera().height));
+    masks.emplace(arguments.export_masks, size);
   }
   std::optional<OverlayWriter> overlay;
   if (!arguments.overlay.empty()) {
@@ -263,7 +273,13 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     system.Reset();
     load_map();
   };
+  ExtraOutput overlay_output("--overlay", console), masks_output("--export-masks", console),
+      recording_output("--record", console);
   RunJournal journal(out);
+  if (!journal.kept().empty()) {
+    console.Say(fmt::format("the journal of a run that was killed is kept: dynamic_slam recover {}",
+                            journal.kept().string()));
+  }
   Checkpoint checkpoint(arguments.save_map, arguments.save_map_every_min, console);
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
@@ -274,13 +290,18 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     }
     checkpoint.SaveIfDue(system);
     recorder.Watch(progress);
-    if (overlay.has_value()) overlay->Write(progress);
-    if (masks.has_value()) masks->Write(*progress.image, *progress.result);
-    if (viewer.has_value()) viewer->Watch(progress, system, reset, control.should_stop);
+    unmatched.Watch(*progress.image);
+    if (overlay.has_value()) overlay_output.Try([&] { overlay->Write(progress); });
+    if (masks.has_value()) masks_output.Try([&] { masks->Write(*progress.image, *progress.result); });
+    if (viewer.has_value()) {
+      viewer->Watch(progress, system, reset, control.should_stop);
+      recording_output.Try([&] { viewer->CheckRecording(); });
+    }
   };
   RunSummary summary = RunSequence(*source, system, control);
   summary.source = source_name;
   console.End();
+  unmatched.Finish();
   const bool is_hopeless = summary.failure != nullptr && summary.frames.empty();
   if (is_hopeless) std::rethrow_exception(summary.failure);
   if (wanted_scale.has_value()) summary.scale = FindScale(*wanted_scale, system);
@@ -288,22 +309,36 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   const bool has_results = files.Try([&] { WriteResults(out, system, summary); });
   if (has_results) journal.Remove();
   const bool saves_map = !arguments.save_map.empty() && summary.failure == nullptr;
-  if (saves_map) files.Try([&] { WriteMapFile(arguments.save_map, system.camera(), *system.map().Read()); });
+  const bool has_map = saves_map && files.Try([&] {
+    WriteMapFile(arguments.save_map, system.camera(), *system.map().Read());
+  });
+  if (!arguments.save_map.empty() && !has_map)
+    console.Say(fmt::format("warning: the map is not saved: {}", arguments.save_map));
   if (arguments.truth.empty()) truth = FindTruth(arguments.source);
-  files.Try([&] {
+  const bool has_report = files.Try([&] {
     WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
   });
   PrintSummary(summary);
-  if (truth.has_value()) ReportTruth(*truth, system.FrameTrajectory(), out);
-  if (!arguments.trace.empty()) EndTrace(arguments.trace);
+  if (truth.has_value()) files.Try([&] { ReportTruth(*truth, system.FrameTrajectory(), out); });
+  if (!arguments.trace.empty()) files.Try([&] { EndTrace(arguments.trace); });
   if (!has_results)
     console.Say(fmt::format("Make space; dynamic_slam recover {} then writes the path.", out.string()));
-  if (summary.failure == nullptr) files.ThrowFailure();  // else that one is the cause
-  if (saves_map) fmt::print("map: {}\n", arguments.save_map);
-  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
+  if (has_map) fmt::print("map: {}\n", arguments.save_map);
+  if (has_results && has_report)
+    fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
   // After all results: a recording that cannot be written must not take them along.
-  if (viewer.has_value()) viewer->Finish(system);
-  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);
+  if (viewer.has_value()) {
+    viewer->Finish(system);
+    recording_output.Try([&] { viewer->CheckRecording(); });
+  }
+  for (const ExtraOutput* extra : {&overlay_output, &masks_output, &recording_output})
+    files.Note(extra->failure());
+  if (summary.failure != nullptr) std::rethrow_exception(summary.failure);  // the cause of all else
+  files.ThrowFailure();
+  if (const std::string reason = source->EndReason(); !reason.empty()) {
+    throw InputError(source_name, reason,
+                     "These are the results up to then. Check cable, power and network.");
+  }
   if (summary.interrupted) *exit_code = kExitInterrupted;
 }
 

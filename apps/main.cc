@@ -121,6 +121,7 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   // Who reads what is printed may go away; results are for files.
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   const int code = Main(argc, argv);
   if (dynamic_slam::Worker::AbandonedCount() > 0) {
     // A network that hangs still runs, and uses what destructors would take away.

@@ -22,9 +22,10 @@ class MaskFolder {
   // The boxes of the frame's dynamic objects. Throws InputError when the file cannot be written.
   void Write(const SourceImage& image, const FrameResult& result) const;
 
- private:
   std::filesystem::path PathOf(const SourceImage& image) const;
+  const std::filesystem::path& folder() const { return folder_; }
 
+ private:
   std::filesystem::path folder_;
   cv::Size size_;
 };

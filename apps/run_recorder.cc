@@ -13,7 +13,7 @@ constexpr int kFrames = 8;  // in a report
 }  // namespace
 
 RunRecorder::RunRecorder(std::filesystem::path source, const Camera& raw_camera, const ImageOptions& options)
-    : source_(std::move(source)), frames_(raw_camera, options, kFrames) {}
+    : source_(std::move(source)), preparer_(raw_camera, options), frames_(raw_camera, options, kFrames) {}
 
 std::shared_ptr<Detector> RunRecorder::Record(std::shared_ptr<Detector> detector) {
   if (detector != nullptr) detector_ = std::make_shared<RecordingDetector>(std::move(detector));
@@ -36,7 +36,7 @@ RunRecord RunRecorder::Finish(const RunSummary& summary, std::optional<Trajector
   for (const RunSummary::FrameRecord& frame : summary.frames) stamps_s.push_back(frame.timestamp_s);
   record.detected = MoversOf(detector_->records());
   record.compensated = MoversOf(std::move(compensated_));
-  record.true_boxes = TrueMovers(source_, stamps_s);
+  record.true_boxes = TrueMovers(source_, stamps_s, preparer_);
   return record;
 }
 

@@ -26,6 +26,7 @@ class RunRecorder {
 
  private:
   std::filesystem::path source_;
+  ImagePreparer preparer_;
   FrameChoice frames_;
   std::shared_ptr<RecordingDetector> detector_;
   std::vector<BoxRecord> compensated_;

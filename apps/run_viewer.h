@@ -46,6 +46,9 @@ class RunViewer {
   void Watch(const RunProgress& progress, const SlamSystem& system, const std::function<void()>& reset,
              const std::function<bool()>& should_stop);
 
+  // Throws InputError when the recording had to end.
+  void CheckRecording() const { view_.CheckRecording(); }
+
   void Finish(const SlamSystem& system) { view_.Finish(system); }
 
  private:
@@ -69,6 +72,7 @@ inline std::vector<std::string> WithViewerPort(std::vector<std::string> argument
 struct RunViewer {
   explicit RunViewer(const auto&...) {}
   void Watch(const auto&...) {}
+  void CheckRecording() const {}
   void Finish(const auto&) {}
 };
 

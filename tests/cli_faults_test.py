@@ -133,6 +133,18 @@ class CliFaultsTest(unittest.TestCase):
                     valid = subprocess.run([PROGRAM, "map", "validate", saved], capture_output=True, text=True)
                     self.assertEqual(valid.returncode, 0, valid.stderr)
 
+    def test_a_killed_run_that_is_started_again(self):
+        out, _, _ = self.kill_after("again", 1)
+        again = subprocess.run([PROGRAM, "run", self.room, "--quiet", "--out", out], capture_output=True, text=True)
+        self.assertEqual(again.returncode, 0, again.stderr)
+        kept = os.path.join(out, "journal.1.csv")
+        self.assertIn(f"dynamic_slam recover {kept}", again.stderr)
+        finished = read_lines(os.path.join(out, "frames.csv"))
+        recovered = subprocess.run([PROGRAM, "recover", kept], capture_output=True, text=True)
+        self.assertEqual(recovered.returncode, 0, recovered.stderr)
+        self.assertGreater(len(read_lines(os.path.join(out, "journal.1", "frames.csv"))), 20)
+        self.assertEqual(read_lines(os.path.join(out, "frames.csv")), finished, "they are of the second run")
+
     def test_nothing_to_recover(self):
         run = self.check("whole", "drop=0", FRAMES / FPS)
         self.assertFalse(os.path.exists(os.path.join(run.out, "journal.csv")))

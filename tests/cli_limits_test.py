@@ -76,10 +76,34 @@ class CliLimitsTest(unittest.TestCase):
         saved = os.path.join(self.full_disk(40), "room.map")
         out = os.path.join(self.folder, "map_full")
         result = run_program("run", self.room, "--quiet", "--out", out, "--save-map", saved)
-        self.check_refused(result, saved, "No space left")
+        self.check_refused(result, saved, "No space left", f"the map is not saved: {saved}")
         self.assertFalse(os.path.exists(saved), "half a map")
         for name in ("trajectory.txt", "summary.json", "report.html"):
             self.assertTrue(os.path.exists(os.path.join(out, name)), name)
+
+    def test_what_is_written_beside_the_results_ends_alone(self):
+        """A full disk for the pictures, masks or the recording: one warning, all results, and an exit code that says so."""
+        first = os.path.basename(data_lines(os.path.join(self.room, "rgb.txt"))[0].split()[1]).replace(".jpg", ".png")
+        for option, full in (("--overlay", "000000.jpg"), ("--export-masks", first), ("--record", "recording.view")):
+            with self.subTest(option=option):
+                out, extra = (os.path.join(self.folder, option + end) for end in ("", "_extra"))
+                arguments = ["run", self.room, "--quiet", "--out", out, option]
+                limits = {}
+                if option == "--record":  # which grows; all other files are smaller
+                    limits["preexec_fn"] = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2 * MB, 2 * MB))
+                else:
+                    arguments.append(extra)
+                    os.makedirs(extra)
+                    os.symlink("/dev/full", os.path.join(extra, full))
+                saved = os.path.join(self.folder, option + ".map")
+                result = run_program(*arguments, "--save-map", saved, **limits)
+                self.check_refused(result, f"warning: {option} ends here", full)
+                self.assertEqual(result.stderr.count("warning"), 1, result.stderr)
+                self.assertIn("of 40 frames tracked", result.stdout)
+                self.assertIn("results: ", result.stdout)
+                for name in ("trajectory.txt", "summary.json", "report.html"):
+                    self.assertTrue(os.path.exists(os.path.join(out, name)), name)
+                self.assertEqual(run_program("map", "validate", saved).returncode, 0)
 
     def test_images_for_which_there_is_no_space(self):
         out = os.path.join(self.full_disk(200), "room")

@@ -320,6 +320,38 @@ class CliRunTest(unittest.TestCase):
         # Only in the margin around the box.
         self.assertLess(sum(map(int, left)), 0.2 * sum(map(int, before)))
 
+    def test_boxes_are_of_the_images_of_the_source(self):
+        """Whatever is made of the images first: true boxes, given as a detector's, are found where they are."""
+        walk = os.path.join(self.folder, "walk")
+        result = run_program("simulate", "office_walk", "--frames", "8", "--out", walk)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for options in (["resize_width=320"], ["crop_left=40", "crop_top=30", "crop_width=500", "resize_width=400"]):
+            out = os.path.join(self.folder, "prepared")
+            assignments = [part for option in options for part in ("--set", "image." + option)]
+            result = run_program("run", walk, "--detector", f"boxes:{walk}/boxes.csv", "--quiet", "--out", out, *assignments)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("Recall 100.0% and precision 100.0%", read(out, "report.html"), options)
+
+    def test_boxes_and_masks_of_another_sequence_are_told_of(self):
+        masks, out = os.path.join(self.folder, "masks"), os.path.join(self.folder, "out")
+        result = run_program("run", self.room, "--max-frames", "6", "--out", out, "--export-masks", masks, "--quiet",
+                             "--detector", "boxes:" + self.boxes_file(self.room, 3, True))
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        first = sorted(os.listdir(masks))[0]
+        arguments = ["run", self.room, "--out", out, "--masks", masks, "--quiet", "--detector"]
+        matching = run_program(*arguments, "boxes:" + os.path.join(self.folder, "boxes.csv"), "--max-frames", "6")
+        self.assertEqual(matching.stderr, "")
+        for name in os.listdir(masks):
+            os.rename(os.path.join(masks, name), os.path.join(masks, "mask_" + name))
+        late = self.write("late.csv", "timestamp,x,y,w,h\n1000.5,0,0,9,9\n1001.25,0,0,9,9\n")
+        for frames in ("6", "0"):  # at the end of a short run, and in the middle of a long one
+            result = run_program(*arguments, "boxes:" + late, "--max-frames", frames)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(result.stderr.count("warning: "), 2, result.stderr)
+            self.assertRegex(result.stderr, r"late.csv has boxes for none of \d+ images: their stamps are 0.000 to ")
+            self.assertIn("those of the boxes 1000.500 to 1001.250 s", result.stderr)
+            self.assertIn(f"{first} is not there, but for instance mask_{first}", result.stderr)
+
     def test_masks_that_do_not_fit_are_input_errors(self):
         self.assert_input_error([self.room, "--masks", os.path.join(self.folder, "nowhere")], "nowhere", "no folder")
 

@@ -127,6 +127,14 @@ class DocsTest(unittest.TestCase):
         self.assertEqual(picture.shape, (SIZE[1], SIZE[0], 3))
         self.assertEqual(picture[20, 20].tolist(), [170, 170, 255])
 
+    def test_calibrate_refuses_a_film_that_is_too_short_before_it_looks(self):
+        video = os.path.join(self.folder, "short.avi")
+        write_video(video, [board_image(0.5, 0.5, 0, 0, 0)] * 7)
+        result = run_program("calibrate", video, "--board", "9x6", "--square", "0.025", "--out", "unused.yaml")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("gives 7 images", result.stderr)
+        self.assertNotIn("searched", result.stdout)
+
     def test_a_scale_that_says_nothing_is_refused_before_the_run(self):
         result = run_program("run", "room", "--scale-from", "height:1.6", cwd=self.folder)
         self.assertEqual(result.returncode, 2)

@@ -22,6 +22,7 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
+#include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/semantics/dynamic_prior.h"
 #include "image_input.h"
 #include "parameters.h"
@@ -75,6 +76,7 @@ class SlamNode {
   bool IsInOrder(const std_msgs::Header& header);
   void Skip(const std::string& reason);
   void Forget();
+  void ForgetAllButTheMap();
 
   void AddServices();
   template <class Response>
@@ -184,8 +186,7 @@ bool SlamNode::IsInOrder(const std_msgs::Header& header) {
                      last_stamp_.toSec()));
     return false;
   }
-  ROS_WARN("the stamps begin again: so does the map");
-  Forget();
+  ForgetAllButTheMap();
   return true;
 }
 
@@ -227,6 +228,33 @@ void SlamNode::Forget() {
   tracking_ = {};
   told_ = {};
   last_stamp_ = {};
+}
+
+// The clock went back, as when a bag is played again: what is known of time is void, the map is not.
+void SlamNode::ForgetAllButTheMap() {
+  const bool localises_only = system_->options().tracker.localise_only;
+  std::string bytes;
+  size_t keyframes = 0;
+  {
+    const auto map = system_->map().Read();
+    keyframes = map->keyframes().size();
+    if (keyframes > 0) bytes = EncodeMap(system_->camera(), *map);
+  }
+  Forget();
+  if (keyframes == 0) {
+    ROS_WARN("the stamps begin again; there is no map yet");
+    return;
+  }
+  try {
+    system_->LoadMap(DecodeMap(bytes, "the map"), "the map");
+    if (localises_only) system_->SetLocaliseOnly(true);
+    ROS_WARN(
+        "the stamps begin again: the map of %zu keyframes is kept, and the camera is looked for in it; "
+        "the path begins anew. For a new map, call the service reset",
+        keyframes);
+  } catch (const InputError& error) {
+    ROS_WARN("the stamps begin again, and so does the map: %s", error.what());
+  }
 }
 
 SlamSystem& SlamNode::system() {

@@ -183,6 +183,25 @@ class SlamNodeTest(unittest.TestCase):
     def keyframes(file):
         return [line for line in walk_film.run(PROGRAM, "map", "info", file).splitlines() if "keyframes" in line]
 
+    def test_a_bag_that_is_played_again_keeps_the_map(self):
+        poses = self.listen("pose", PoseStamped)
+        node = start_node(with_boxes())
+        self.service("reset", Trigger)
+        self.play()
+        wait_until(lambda: len(poses) > 20, "poses of the first time have come")
+        seen = len(poses)
+        self.play()
+        wait_until(lambda: len(poses) > seen + 20, "poses of the second time have come")
+        again = [pose_tuple(message) for message in poses.messages[seen:]]
+        # It was found again in the map of the first time: at the same stamps it is in the same places.
+        first = {round(pose[0], 4): pose[1] for pose in map(pose_tuple, poses.messages[:seen])}
+        far = [math.dist(first[round(p[0], 4)], p[1]) for p in again if round(p[0], 4) in first]
+        reach = max(math.dist(a, b) for a in first.values() for b in first.values())
+        self.assertGreater(len(far), 20)
+        self.assertLess(sorted(far)[len(far) // 2], 0.05 * reach)
+        node.stop()
+        self.assertIn("keyframes is kept", node.text())
+
     def test_parameters_are_options(self):
         for parameter, reasons in (("_options/tracker/min_inlier:=3", ("tracker.min_inlier", "tracker.min_inliers")),
                                    ("_options/orb/features:=1", ("orb.features", "50 to 20000")),

@@ -12,7 +12,6 @@
 namespace dynamic_slam {
 namespace {
 
-constexpr size_t kMinViews = 8;
 constexpr double kMinTiltDeg = 15;
 constexpr int kMinTiltedViews =
     4;  // a board that faces the camera does not tell the focal length from its distance
@@ -119,11 +118,11 @@ std::string Count(size_t n, const char* what) { return fmt::format("{} {}{}", n,
 
 BoardCalibration CalibrateBoard(const BoardViews& views, const Board& board, LensModel model) {
   std::vector<BoardView> used = views.views();
-  if (used.size() < kMinViews) {
+  if (used.size() < kMinCalibrationViews) {
     throw InputError(
         "the calibration",
         fmt::format("the whole board is seen in {} that differ, and {} are needed",
-                    Count(used.size(), "image"), kMinViews),
+                    Count(used.size(), "image"), kMinCalibrationViews),
         "Check --board (inner corners); show the board in all parts of the image, tilted, and without blur.");
   }
   BoardCalibration calibration;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@ struct BoardCalibration {
   int tilted_views = 0;               // in which the board is turned away by 15 deg or more
   std::vector<std::string> left_out;  // views that do not fit the others
 };
+
+inline constexpr size_t kMinCalibrationViews = 8;  // that differ
 
 // After Zhang, "A flexible new technique for camera calibration" (2000), and for a fisheye Kannala and Brandt
 // (2006), as OpenCV has them. Throws InputError when the views are too few or do not fit one camera.

@@ -1,7 +1,12 @@
 #include "dynamic_slam/eval/canvas.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -101,13 +106,27 @@ cv::Mat Canvas::Finish() const {
 }
 
 void WritePicture(const std::string& file, const cv::Mat& picture) {
-  bool written = false;
+  std::vector<uchar> bytes;
+  const auto refuse = [&file](const std::string& reason) {
+    throw InputError(file, "cannot be written" + reason,
+                     "Choose another folder with --out, or free some space.");
+  };
   try {
-    written = cv::imwrite(file, picture, {cv::IMWRITE_PNG_COMPRESSION, 9});
+    cv::imencode(std::filesystem::path(file).extension().string(), picture, bytes,
+                 {cv::IMWRITE_PNG_COMPRESSION, 9});
   } catch (const cv::Exception&) {
+    refuse("");
   }
-  if (!written)
-    throw InputError(file, "cannot be written", "Choose another folder with --out, or free some space.");
+  // Not by OpenCV, which does not hear of a disk that is full.
+  errno = 0;
+  std::ofstream stream(file, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  stream.close();
+  if (stream) return;
+  const std::string reason = errno != 0 ? fmt::format(" ({})", std::strerror(errno)) : "";
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(file, ignored)) std::filesystem::remove(file, ignored);  // half of it
+  refuse(reason);
 }
 
 }  // namespace dynamic_slam

@@ -15,7 +15,7 @@ struct BoxRecord {
   std::string class_name = "person";
   double score = 1;    // 0 to 1
   double visible = 1;  // truth: the share of its silhouette that the box shows, 0 to 1
-  Box box;             // px
+  Box box;             // px of the camera's image, before it is cropped or resized
 };
 
 // Comma-separated values with a header that names the columns, in any order: timestamp (s), x, y (top left

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/test_folder.h"
+#include "dynamic_slam/io/image_preparer.h"
 
 namespace dynamic_slam {
 namespace {
@@ -43,6 +44,36 @@ TEST_F(DetectorFactoryTest, ReplaysABoxFile) {
   EXPECT_EQ(first[1].class_id, 0);
   EXPECT_EQ(detector->Detect(image, FrameId(1), 2.0).size(), 1u);
   EXPECT_THAT(detector->Detect(image, FrameId(2), 3.0), testing::IsEmpty());
+}
+
+TEST_F(DetectorFactoryTest, BoxesAreOfTheImagesBeforeTheyArePrepared) {
+  const auto file =
+      Write("boxes.csv", "timestamp,x,y,w,h\n1.0,20,10,40,60\n2.0,0,0,200,100\n3.0,0,0,15,90\n");
+  const auto detector = MakeDetector("boxes:" + file.string());
+  Camera camera;
+  camera.width = 200, camera.height = 100;
+  camera.fx = camera.fy = 100;
+  camera.cx = 100, camera.cy = 50;
+  ImageOptions options;
+  options.crop_left = 16;
+  options.crop_top = 20;
+  options.crop_width = 160;
+  options.resize_width = 80;
+  ImagePreparer preparer(camera, options);
+  detector->SetPreparation(preparer.box_mapping());
+  cv::Mat image;
+  preparer.PrepareColour(cv::Mat::zeros(100, 200, CV_8UC3), &image);
+  const auto cut = detector->Detect(image, FrameId(0), 1.0);
+  ASSERT_EQ(cut.size(), 1u);
+  EXPECT_EQ(cut[0].box.x, 2);
+  EXPECT_EQ(cut[0].box.y, 0);  // above the crop
+  EXPECT_EQ(cut[0].box.width, 20);
+  EXPECT_EQ(cut[0].box.height, 25);
+  const auto all = detector->Detect(image, FrameId(1), 2.0);
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].box.width, 80);
+  EXPECT_EQ(all[0].box.height, 40);
+  EXPECT_THAT(detector->Detect(image, FrameId(2), 3.0), testing::IsEmpty());  // left of it
 }
 
 }  // namespace

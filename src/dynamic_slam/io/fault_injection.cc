@@ -38,6 +38,8 @@ class FaultySource : public CheckedSource {
   }
 
   size_t FrameCount() const override { return source_->FrameCount(); }
+  bool IsLive() const override { return source_->IsLive(); }
+  std::string EndReason() const override { return source_->EndReason(); }
   std::optional<Camera> OwnCamera() const override { return source_->OwnCamera(); }
 
  private:

@@ -32,6 +32,8 @@ class CountingSource : public FrameSource {
   }
   static int GreyOf(int frame) { return 50 + frame % 150; }
   size_t FrameCount() const override { return kFrames + 1; }
+  bool IsLive() const override { return true; }
+  std::string EndReason() const override { return next_ == kFrames ? "it was enough" : ""; }
   std::string Layout() const override { return "counting"; }
   std::optional<Camera> OwnCamera() const override { return std::nullopt; }
   cv::Size ImageSize() const override { return {6, 4}; }
@@ -56,6 +58,8 @@ Seen See(const std::string& faults) {
   }
   EXPECT_EQ(source->Problems().size(), seen.problems.size() + 1);
   EXPECT_EQ(source->Layout(), "counting");
+  EXPECT_TRUE(source->IsLive());
+  EXPECT_EQ(source->EndReason(), "it was enough");
   EXPECT_EQ(source->ImageSize(), cv::Size(6, 4));
   return seen;
 }

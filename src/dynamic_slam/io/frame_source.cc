@@ -89,7 +89,7 @@ class VideoSource : public CheckedSource {
       : CheckedSource("video", options.any_size) {
     if (!OpenQuietly(path.string())) {
       throw InputError(
-          path.string(), "is not a video that can be read",
+          WithoutPassword(path.string()), "is not a video that can be read",
           "Give the folder of a sequence; or convert the video, for instance with ffmpeg to MP4.");
     }
     fps_ = options.fps > 0 ? options.fps : capture_.get(cv::CAP_PROP_FPS);
@@ -100,7 +100,7 @@ class VideoSource : public CheckedSource {
     // Seeking by number is inexact in many formats; grabbing is exact and converts nothing.
     while (index_ < start_ && capture_.grab()) ++index_;
     if (options.max_frames > 0) end_ = start_ + static_cast<size_t>(options.max_frames);
-    ReadFirst(path);
+    ReadFirst(WithoutPassword(path.string()));
   }
 
   size_t FrameCount() const override {
@@ -153,7 +153,10 @@ std::unique_ptr<FrameSource> OpenFrameSource(const fs::path& path, const FrameSo
                                  options.start, options.max_frames),
                      "Leave out what is not needed.");
   }
-  if (IsLiveSource(path.string())) return OpenLiveSource(path.string(), options);
+  if (IsLiveSource(path.string())) {
+    if (auto live = OpenLiveSource(path.string(), options)) return live;
+    return std::make_unique<VideoSource>(path, options);
+  }
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw InputError(path.string(), "there is no such file or folder", "Check the path.");

@@ -45,6 +45,9 @@ class DYNAMIC_SLAM_API FrameSource {
   // Whether images come by themselves at their time, and are gone when nobody takes them.
   virtual bool IsLive() const { return false; }
 
+  // Why Next() said that this is the end, where it should not be: a stream that stayed away. Else "".
+  virtual std::string EndReason() const { return ""; }
+
   // The camera that the source itself describes (camera.yaml, else KITTI's calib.txt or EuRoC's sensor.yaml),
   // if any. Throws InputError when that file is wrong.
   virtual std::optional<Camera> OwnCamera() const = 0;

@@ -127,6 +127,12 @@ ImagePreparer::ImagePreparer(const Camera& raw_camera, const ImageOptions& optio
   if (!options.mask.empty()) mask_ = ReadMask(options.mask);
 }
 
+BoxMapping ImagePreparer::box_mapping() const {
+  return {static_cast<double>(crop_.x), static_cast<double>(crop_.y),
+          static_cast<double>(camera_.width) / crop_.width,
+          static_cast<double>(camera_.height) / crop_.height};
+}
+
 cv::Mat ImagePreparer::ReadMask(const std::string& file) const {
   std::string reason;
   cv::Mat image = ReadImage(file, &reason);

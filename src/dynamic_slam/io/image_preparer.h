@@ -6,6 +6,7 @@
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/io/image_options.h"
+#include "dynamic_slam/semantics/box_mapping.h"
 
 namespace dynamic_slam {
 
@@ -19,6 +20,9 @@ class ImagePreparer {
 
   // The camera of the prepared images.
   const Camera& camera() const { return camera_; }
+
+  // Where what is at a place of a raw image is in a prepared one.
+  BoxMapping box_mapping() const;
 
   // CV_8UC1 of camera()'s size, not 0 where the mask file forbids keypoints; empty without a mask file.
   const cv::Mat& mask() const { return mask_; }

@@ -1,5 +1,6 @@
 #include "dynamic_slam/io/live_source.h"
 
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <utility>
@@ -40,6 +41,7 @@ class LiveSource : public CheckedSource {
 
   size_t FrameCount() const override { return 0; }
   bool IsLive() const override { return true; }
+  std::string EndReason() const override { return end_reason_; }
   std::optional<Camera> OwnCamera() const override { return std::nullopt; }
 
  protected:
@@ -52,6 +54,8 @@ class LiveSource : public CheckedSource {
         if (!Reconnect()) return false;
       }
       const double now_s = clock_.now_s();
+      if (lost_s_.has_value()) Tell(fmt::format("found again after {:.1f} s", now_s - *lost_s_));
+      lost_s_.reset();
       if (!first_s_.has_value()) first_s_ = now_s;
       *image = {now_s - *first_s_, grabbed.clone(), fmt::format("image {}", index_++)};
     } while (index_ <= options_.start);
@@ -64,21 +68,24 @@ class LiveSource : public CheckedSource {
     if (options_.on_event) options_.on_event(name_ + ": " + event);
   }
 
-  // False: it stays away, or nobody wants it any more.
+  // Opens it again. False: it stays away, or nobody wants it any more. One that can be opened, but gives no
+  // image, is still away.
   bool Reconnect() {
     if (!first_s_.has_value()) return false;  // there never was an image
-    Tell(fmt::format("no more images; it is looked for again, for {:.0f} s", kPatienceS));
-    const double lost_s = clock_.now_s();
+    bool waits = lost_s_.has_value();         // not before the first attempt
+    if (!waits) {
+      lost_s_ = clock_.now_s();
+      Tell(fmt::format("no more images; it is looked for again, for {:.0f} s", kPatienceS));
+    }
     while (!(options_.should_stop && options_.should_stop())) {
-      if (grabber_->Open()) {
-        Tell(fmt::format("found again after {:.1f} s", clock_.now_s() - lost_s));
-        return true;
-      }
-      if (clock_.now_s() - lost_s >= kPatienceS) {
+      if (clock_.now_s() - *lost_s_ >= kPatienceS) {
+        end_reason_ = fmt::format("gave no image for {:.0f} s", kPatienceS);
         Tell("given up");
         return false;
       }
-      clock_.wait_s(kRetryS);
+      if (waits) clock_.wait_s(kRetryS);
+      if (grabber_->Open()) return true;
+      waits = true;
     }
     return false;
   }
@@ -88,7 +95,8 @@ class LiveSource : public CheckedSource {
   FrameSourceOptions options_;
   LiveClock clock_;
   int index_ = 0, count_ = 0;
-  std::optional<double> first_s_;
+  std::optional<double> first_s_, lost_s_;
+  std::string end_reason_;
 };
 
 class OpenCvGrabber : public ImageGrabber {
@@ -104,6 +112,11 @@ class OpenCvGrabber : public ImageGrabber {
   }
 
   bool Grab(cv::Mat* image) override { return capture_.read(*image); }
+
+  // Of a stream FFmpeg does not know how long it is.
+  bool IsFilm() const {
+    return !name_.starts_with(kCameraPrefix) && capture_.get(cv::CAP_PROP_FRAME_COUNT) > 0;
+  }
 
  private:
   bool OpenCamera() {
@@ -148,6 +161,28 @@ std::string WithoutPassword(std::string name) {
   return colon < at ? name.replace(colon + 1, at - colon - 1, "***") : name;
 }
 
+std::filesystem::path LiveFolder(const std::filesystem::path& parent, const std::string& name) {
+  // Who asks and how is nobody's business: the host and the path only.
+  std::string stem = name;
+  if (const size_t scheme = name.find("://"); scheme != std::string::npos) {
+    stem = name.substr(scheme + 3, name.find_first_of("?#") - (scheme + 3));
+    stem.erase(0, stem.substr(0, stem.find('/')).rfind('@') + 1);
+  }
+  while (stem.ends_with('/')) stem.pop_back();
+  for (char& letter : stem) {
+    if (!std::isalnum(static_cast<unsigned char>(letter)) && letter != '.' && letter != '-') letter = '_';
+  }
+  stem.erase(0, stem.find_first_not_of("._"));
+  if (stem.empty()) stem = "live";
+  std::filesystem::path folder = parent / stem;
+  std::error_code ignored;
+  for (int i = 2; std::filesystem::exists(folder, ignored) && !std::filesystem::is_empty(folder, ignored);
+       ++i) {
+    folder = parent / fmt::format("{}_{}", stem, i);
+  }
+  return folder;
+}
+
 std::unique_ptr<FrameSource> MakeLiveSource(const std::string& name, std::unique_ptr<ImageGrabber> grabber,
                                             const FrameSourceOptions& options, LiveClock clock) {
   return std::make_unique<LiveSource>(WithoutPassword(name), std::move(grabber), options, std::move(clock));
@@ -159,7 +194,10 @@ std::unique_ptr<FrameSource> OpenLiveSource(const std::string& name, const Frame
                           return std::chrono::duration<double>(now).count();
                         },
                         Sleep};
-  return MakeLiveSource(name, std::make_unique<OpenCvGrabber>(name), options, clock);
+  auto grabber = std::make_unique<OpenCvGrabber>(name);
+  const OpenCvGrabber& opened = *grabber;
+  std::unique_ptr<FrameSource> source = MakeLiveSource(name, std::move(grabber), options, clock);
+  return opened.IsFilm() ? nullptr : std::move(source);
 }
 
 }  // namespace dynamic_slam

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/videoio.hpp>
 
 #include "dynamic_slam/base/error.h"
 
@@ -41,7 +42,11 @@ class LiveSourceTest : public ::testing::Test {
   // An image every 0.1 s.
   std::unique_ptr<FrameSource> Open(std::deque<int> images, FrameSourceOptions options = {}) {
     options.on_event = [this](const std::string& event) { events_.push_back(event); };
-    const LiveClock clock{[this] { return now_s_ += 0.1; }, [this](double s) { now_s_ += s; }};
+    const LiveClock clock{[this] { return now_s_ += 0.1; },
+                          [this](double s) {
+                            now_s_ += s;
+                            ++waits_;
+                          }};
     return MakeLiveSource("camera:7", std::make_unique<FakeCamera>(std::move(images)), options, clock);
   }
 
@@ -52,6 +57,7 @@ class LiveSourceTest : public ::testing::Test {
   }
 
   double now_s_ = 1000;
+  int waits_ = 0;
   std::vector<std::string> events_;
 };
 
@@ -74,8 +80,20 @@ TEST_F(LiveSourceTest, IsGivenUpAfterAMinute) {
   const auto source = Open({2});
   EXPECT_EQ(Stamps(source.get()).size(), 2u);
   EXPECT_THAT(events_, ElementsAre(HasSubstr("no more images"), HasSubstr("given up")));
+  EXPECT_EQ(source->EndReason(), "gave no image for 60 s");
   EXPECT_GT(now_s_, 1060);
   EXPECT_LT(now_s_, 1070);
+}
+
+TEST_F(LiveSourceTest, WhatOpensWithoutAnImageIsStillAway) {
+  std::deque<int> images(100000, 0);
+  images.front() = 2;
+  const auto source = Open(images);
+  EXPECT_EQ(Stamps(source.get()).size(), 2u);
+  EXPECT_THAT(events_, ElementsAre(HasSubstr("no more images"), HasSubstr("given up")));
+  EXPECT_GT(now_s_, 1060);
+  EXPECT_LT(waits_, 62) << "no more often than once a second";
+  EXPECT_GT(waits_, 40);
 }
 
 TEST_F(LiveSourceTest, IsGivenUpWhenItIsNotWanted) {
@@ -83,6 +101,7 @@ TEST_F(LiveSourceTest, IsGivenUpWhenItIsNotWanted) {
   options.should_stop = [] { return true; };
   const auto source = Open({2}, options);
   EXPECT_EQ(Stamps(source.get()).size(), 2u);
+  EXPECT_EQ(source->EndReason(), "");
   EXPECT_LT(now_s_, 1002);
 }
 
@@ -108,12 +127,42 @@ TEST_F(LiveSourceTest, WhatCannotBeOpenedIsAnError) {
   EXPECT_THROW(OpenFrameSource("rtsp://127.0.0.1:1/nothing"), InputError);
 }
 
+TEST(LiveSourceNameTest, TheAddressOfAFilmIsAFilm) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "film.avi";
+  cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, {64, 48});
+  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV cannot write videos";
+  for (int i = 0; i < 12; ++i) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20 * i)));
+  writer.release();
+  const auto source = OpenFrameSource("file://" + file.string());
+  EXPECT_FALSE(source->IsLive());
+  EXPECT_EQ(source->FrameCount(), 12u);
+  int images = 0;
+  for (; const auto image = source->Next(); ++images) EXPECT_NEAR(image->timestamp_s, images / 20.0, 1e-6);
+  EXPECT_EQ(images, 12);
+  std::filesystem::remove(file);
+}
+
 TEST(LiveSourceNameTest, IsToldFromFiles) {
   for (const char* name : {"camera:0", "rtsp://10.0.0.1/stream", "http://host:8080/video"}) {
     EXPECT_TRUE(IsLiveSource(name)) << name;
   }
   for (const char* name : {"video.mp4", "/data/camera", "camera0", "a:b"})
     EXPECT_FALSE(IsLiveSource(name)) << name;
+}
+
+TEST(LiveSourceNameTest, EachRunHasAFolderOfItsOwn) {
+  const auto parent = std::filesystem::path(testing::TempDir()) / "live_folders";
+  std::filesystem::remove_all(parent);
+  EXPECT_EQ(LiveFolder(parent, "camera:0"), parent / "camera_0");
+  std::filesystem::create_directories(parent / "camera_0");
+  EXPECT_EQ(LiveFolder(parent, "camera:0"), parent / "camera_0") << "it is empty";
+  std::filesystem::create_directories(parent / "camera_0" / "results");
+  EXPECT_EQ(LiveFolder(parent, "camera:0"), parent / "camera_0_2");
+  EXPECT_EQ(LiveFolder(parent, "camera:1"), parent / "camera_1");
+  EXPECT_EQ(LiveFolder(parent, "rtsp://me:s/e@cret@10.0.0.1:554/a/?token=b").parent_path(), parent);
+  EXPECT_EQ(LiveFolder(parent, "rtsp://me:secret@10.0.0.1:554/a/b?token=c"), parent / "10.0.0.1_554_a_b");
+  EXPECT_EQ(LiveFolder(parent, "http://../.."), parent / "live");
+  std::filesystem::remove_all(parent);
 }
 
 TEST(LiveSourceNameTest, IsShownWithoutThePassword) {

@@ -15,6 +15,8 @@ class RecordingDetector : public Detector {
   explicit RecordingDetector(std::shared_ptr<Detector> detector)
       : Detector(detector->name(), detector->class_names()), detector_(std::move(detector)) {}
 
+  void SetPreparation(const BoxMapping& mapping) override { detector_->SetPreparation(mapping); }
+
   // In the order of the images, as far as it came; it may still be at work when the run has ended.
   std::vector<BoxRecord> records() const { return *records_.Read(); }
 

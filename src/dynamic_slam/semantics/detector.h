@@ -6,6 +6,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "dynamic_slam/base/ids.h"
+#include "dynamic_slam/semantics/box_mapping.h"
 #include "dynamic_slam/semantics/detection.h"
 
 namespace dynamic_slam {
@@ -19,6 +20,10 @@ class Detector {
   // it says is as Sanitise leaves it. A detector that reads its answers looks them up by the stamp. Throws
   // what the detector throws.
   std::vector<Detection> Detect(const cv::Mat& image, FrameId frame, double timestamp_s);
+
+  // How images are prepared for it, for detectors that know boxes of the camera's own images. To be called
+  // before the first image.
+  virtual void SetPreparation(const BoxMapping&) {}
 
   // As it was asked for: "hog", the name of a detector file, "boxes".
   const std::string& name() const { return name_; }

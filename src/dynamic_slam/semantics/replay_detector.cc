@@ -29,6 +29,8 @@ class ReplayDetector : public Detector {
     DS_CHECK(std::is_sorted(sets_.begin(), sets_.end(), IsEarlier), "{} sets", sets_.size());
   }
 
+  void SetPreparation(const BoxMapping& mapping) override { mapping_ = mapping; }
+
  private:
   std::vector<Detection> Find(const cv::Mat&, FrameId, double timestamp_s) override {
     auto nearest = std::lower_bound(sets_.begin(), sets_.end(), DetectionSet{{}, timestamp_s, {}}, IsEarlier);
@@ -37,11 +39,14 @@ class ReplayDetector : public Detector {
       --nearest;
     }
     if (nearest == sets_.end() || !(std::abs(nearest->timestamp_s - timestamp_s) <= tolerance_s_)) return {};
-    return nearest->detections;
+    std::vector<Detection> detections = nearest->detections;
+    for (Detection& detection : detections) detection.box = mapping_(detection.box);
+    return detections;
   }
 
   std::vector<DetectionSet> sets_;
   double tolerance_s_;
+  BoxMapping mapping_;
 };
 
 }  // namespace

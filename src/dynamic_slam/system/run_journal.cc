@@ -20,9 +20,28 @@ constexpr size_t kColumns = 9;
 
 std::string Header() { return std::string(kPoseColumns) + FramesCsvHeader(); }
 
+// Moves a journal that tells of frames out of the way; where to, or nothing.
+std::filesystem::path Keep(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return {};
+  const uintmax_t bytes = std::filesystem::file_size(file, error);
+  if (error || bytes <= Header().size()) return {};
+  std::filesystem::path kept;
+  for (int i = 1; kept.empty() || std::filesystem::exists(kept); ++i) {
+    kept = file.parent_path() / fmt::format("{}.{}.csv", file.stem().string(), i);
+  }
+  std::filesystem::rename(file, kept, error);
+  if (error) {
+    throw InputError(file.string(), fmt::format("of a killed run cannot be kept ({})", error.message()),
+                     "Choose another folder with --out.");
+  }
+  return kept;
+}
+
 }  // namespace
 
-RunJournal::RunJournal(std::filesystem::path folder) : file_(std::move(folder) / kFileName), stream_(file_) {
+RunJournal::RunJournal(std::filesystem::path folder)
+    : file_(std::move(folder) / kFileName), kept_(Keep(file_)), stream_(file_) {
   stream_ << Header() << std::flush;
   if (!stream_) throw InputError(file_.string(), "cannot be written", "Choose another folder with --out.");
 }
@@ -49,8 +68,9 @@ void RunJournal::Remove() {
   std::filesystem::remove(file_, ignored);
 }
 
-RecoveredRun ReadJournal(const std::filesystem::path& folder) {
-  const std::filesystem::path file = folder / RunJournal::kFileName;
+RecoveredRun ReadJournal(const std::filesystem::path& folder_or_file) {
+  const bool is_file = std::filesystem::is_regular_file(folder_or_file);
+  const std::filesystem::path file = is_file ? folder_or_file : folder_or_file / RunJournal::kFileName;
   const std::string name = file.string();
   if (!std::filesystem::exists(file)) {
     throw InputError(

@@ -17,8 +17,12 @@ class RunJournal {
  public:
   static constexpr const char* kFileName = "journal.csv";
 
-  // Throws InputError when the file cannot be written.
+  // A journal with frames that is there already, of a run that was killed, is kept under another name. Throws
+  // InputError when the file cannot be written.
   explicit RunJournal(std::filesystem::path folder);
+
+  // Where an older journal went; empty where there was none.
+  const std::filesystem::path& kept() const { return kept_; }
 
   // part, world_from_cam: of a frame that has a pose. A disk that is full ends the journal, not the run:
   // false, once.
@@ -28,7 +32,7 @@ class RunJournal {
   void Remove();
 
  private:
-  std::filesystem::path file_;
+  std::filesystem::path file_, kept_;
   std::ofstream stream_;
 };
 
@@ -38,8 +42,8 @@ struct RecoveredRun {
   std::vector<Trajectory> trajectories;  // of each part of the map, that with most frames first
 };
 
-// What the journal in the folder of a run tells. Its last line may be cut off. Throws InputError when there
-// is none, or it is none.
-RecoveredRun ReadJournal(const std::filesystem::path& folder);
+// What a journal, or that in the folder of a run, tells. Its last line may be cut off. Throws InputError when
+// there is none, or it is none.
+RecoveredRun ReadJournal(const std::filesystem::path& folder_or_file);
 
 }  // namespace dynamic_slam

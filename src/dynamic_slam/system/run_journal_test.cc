@@ -53,6 +53,21 @@ TEST_F(RunJournalTest, TellsWhatItWasTold) {
   EXPECT_EQ(std::count(run.frames_csv.begin(), run.frames_csv.end(), '\n'), 11);
 }
 
+TEST_F(RunJournalTest, AnOlderOneIsKept) {
+  for (int run = 0; run < 3; ++run) {  // each is killed
+    RunJournal journal(folder_);
+    EXPECT_EQ(journal.kept(),
+              run == 0 ? std::filesystem::path() : folder_ / fmt::format("journal.{}.csv", run));
+    for (int i = 0; i < 3 + run; ++i) Add(i, 0, &journal);
+  }
+  EXPECT_EQ(ReadJournal(folder_ / "journal.1.csv").frames, 3u);
+  EXPECT_EQ(ReadJournal(folder_ / "journal.2.csv").frames, 4u);
+  EXPECT_EQ(ReadJournal(folder_).frames, 5u);
+  { RunJournal without_frames(folder_); }
+  RunJournal journal(folder_);
+  EXPECT_TRUE(journal.kept().empty());
+}
+
 TEST_F(RunJournalTest, APartThatWasErasedIsGone) {
   RunJournal journal(folder_);
   for (int i = 0; i < 5; ++i) Add(i, 0, &journal);

@@ -207,6 +207,7 @@ void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
   DS_CHECK(frame_count_ == 0, "frames={}", frame_count_);
   detection_.reset();
   if (detector != nullptr) {
+    detector->SetPreparation(preparer_.box_mapping());
     detection_.emplace(std::move(detector), options_.detector, camera(), executor_.get());
   }
 }

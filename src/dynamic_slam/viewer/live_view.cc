@@ -211,7 +211,7 @@ void LiveView::Send(Picture picture, bool must_arrive) {
   picture.timestamp_s = timestamp_s_;
   if (!server_.has_value()) {
     picture.events = std::exchange(events_, {});
-    return Take(std::move(picture));
+    return TakeSafely(std::move(picture));
   }
   {
     MutexLock lock(mutex_);
@@ -221,7 +221,7 @@ void LiveView::Send(Picture picture, bool must_arrive) {
   picture.events = std::exchange(events_, {});
   ++on_the_way_;
   server_->Post([this, picture = std::make_shared<Picture>(std::move(picture))] {
-    TakeForServer(std::move(*picture));
+    TakeSafely(std::move(*picture));
     {
       MutexLock lock(mutex_);
       --on_the_way_;
@@ -256,7 +256,7 @@ void LiveView::Emit(const Message& message) {
   if (recording_.has_value()) recording_->Add(shown_.timestamp_s, message);
 }
 
-void LiveView::TakeForServer(Picture picture) {
+void LiveView::TakeSafely(Picture picture) {
   try {
     Take(std::move(picture));
   } catch (...) {  // a full disk ends the recording, not the run
@@ -349,13 +349,18 @@ void LiveView::SendAgain(std::optional<MapPicture> map) {
     Picture last = shown_;
     last.events = events;
     last.map = std::move(*map);
-    TakeForServer(std::move(last));
+    TakeSafely(std::move(last));
   };
   if (server_.has_value()) {
     server_->Post(std::move(change));
   } else {
     change();
   }
+}
+
+void LiveView::CheckRecording() const {
+  MutexLock lock(mutex_);
+  if (failure_ != nullptr) std::rethrow_exception(failure_);
 }
 
 void LiveView::Finish(const SlamSystem& system) {
@@ -367,8 +372,6 @@ void LiveView::Finish(const SlamSystem& system) {
   }
   SendAgain(std::move(map));
   if (server_.has_value()) server_->Flush(std::chrono::milliseconds(1000));
-  MutexLock lock(mutex_);
-  if (failure_ != nullptr) std::rethrow_exception(failure_);
 }
 
 }  // namespace dynamic_slam

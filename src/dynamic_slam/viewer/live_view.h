@@ -57,6 +57,9 @@ class LiveView : private Show {
   // The map and the path were forgotten.
   void WasReset();
 
+  // Throws what ended the recording, a full disk for one; the view goes on.
+  void CheckRecording() const;
+
   // The map as it became in the end. Waits a moment for browsers to have it.
   void Finish(const SlamSystem& system);
 
@@ -92,7 +95,7 @@ class LiveView : private Show {
 
   // Of the server's thread, or, without one, of tracking's.
   void Take(Picture picture);
-  void TakeForServer(Picture picture);
+  void TakeSafely(Picture picture);
   void Emit(const Message& message);
   Message FrameMessage();
   Message Player();

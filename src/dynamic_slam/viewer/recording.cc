@@ -34,7 +34,8 @@ void RecordingWriter::Add(double timestamp_s, const Message& message) {
   const Prefix prefix{timestamp_s, static_cast<uint32_t>(message->size()), 0};
   stream_.write(reinterpret_cast<const char*>(&prefix), sizeof(prefix));
   stream_.write(message->data(), static_cast<std::streamsize>(message->size()));
-  if (!stream_) throw InputError(file_.string(), "cannot be written any more", "Is the disk full?");
+  // At once, so that the last messages are not lost without a word.
+  if (!stream_.flush()) throw InputError(file_.string(), "cannot be written any more", "Is the disk full?");
 }
 
 RecordingReader::RecordingReader(const std::filesystem::path& file)
