@@ -142,7 +142,7 @@ class CliFaultsTest(unittest.TestCase):
         finished = read_lines(os.path.join(out, "frames.csv"))
         recovered = subprocess.run([PROGRAM, "recover", kept], capture_output=True, text=True)
         self.assertEqual(recovered.returncode, 0, recovered.stderr)
-        self.assertGreater(len(read_lines(os.path.join(out, "journal.1", "frames.csv"))), 20)
+        self.assertGreater(len(read_lines(os.path.join(out, "journal.1", "frames.csv"))), 2)
         self.assertEqual(read_lines(os.path.join(out, "frames.csv")), finished, "they are of the second run")
 
     def test_nothing_to_recover(self):
