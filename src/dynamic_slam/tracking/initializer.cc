@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "dynamic_slam/geometry/triangulation.h"
 #include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
@@ -24,13 +23,6 @@ constexpr double kMinPreference = 5.0;
 // The same, when the errors of the two are too alike to be certain. Above what a rolling shutter was seen to
 // do.
 constexpr double kMinTryPreference = 8.0;
-
-// Whether two motions became one when all views were asked, the scale of the translation apart.
-bool Agree(const Rigid3& a, const Rigid3& b) {
-  constexpr double kMaxRotationRad = 0.02, kMaxDirectionRad = 0.1;
-  return RotationAngle(a.rotation, b.rotation) < kMaxRotationRad &&
-         ParallaxAngle(a.translation, b.translation) < kMaxDirectionRad;
-}
 
 }  // namespace
 
@@ -183,7 +175,6 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
   InitialStructure& best = structures.front();
   double cost_ratio = 0, preference = std::numeric_limits<double>::max();
   for (size_t i = 1; i < structures.size(); ++i) {
-    if (Agree(best.last_from_reference, structures[i].last_from_reference)) continue;
     cost_ratio = std::max(cost_ratio, best.MeanCost() / structures[i].MeanCost());
     preference = std::min(preference, Preference(best, structures[i]));
   }
