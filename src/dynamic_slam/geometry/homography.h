@@ -28,8 +28,7 @@ std::vector<Rigid3> PosesFromHomography(const Eigen::Matrix3d& second_H_first,
 
 // The other motion that takes the plane nearest to the points where `second_from_first` takes it, with
 // |translation| = 1 and either sign: two views of a scene close to a plane fit both. Nothing when there is
-// none, as when the plane is approached head-on. Rotated by less than the points' noise allows, it is the
-// same motion.
+// none, as when the plane is approached head-on.
 std::optional<Rigid3> TwinMotion(const Rigid3& second_from_first,
                                  std::span<const Eigen::Vector3d> points_in_first);
 
