@@ -27,6 +27,7 @@ const std::vector<Variant>& Variants() {
       {"paper", {"dynamic.method=paper"}},
       {"default", {}},
       {"- motion", {"dynamic.motion=false"}},
+      {"- past views", {"dynamic.past_views=false"}},
       {"- landmark odds", {"dynamic.landmark_odds=false"}},
       {"- more features", {"dynamic.more_features=false"}},
       {"- shield", {"dynamic.shield_hidden=false"}},

@@ -90,7 +90,8 @@ std::vector<KeyframeId> LandmarkFactory::Neighbours(const Map& map, KeyframeId i
   std::vector<KeyframeId> neighbours;
   const Keyframe& keyframe = map.keyframes().At(id);
   const size_t count = static_cast<size_t>(options_.triangulation_neighbours);
-  for (const CovisibleKeyframe& other : keyframe.BestCovisible(count)) {
+  for (const CovisibleKeyframe& other : keyframe.BestCovisible(keyframe.covisible().size())) {
+    if (neighbours.size() == count) break;
     const Keyframe& neighbour = map.keyframes().At(other.id);
     const double baseline = (neighbour.CenterInWorld() - keyframe.CenterInWorld()).norm();
     if (baseline >= options_.min_baseline_ratio * map.MedianDepth(other.id)) neighbours.push_back(other.id);

@@ -7,7 +7,7 @@ namespace dynamic_slam {
 
 struct MapperOptions {
   int triangulation_neighbours = 10;
-  double min_baseline_ratio = 0.01;
+  double min_baseline_ratio = 0.05;
   double min_parallax_deg = 1.75;
   int fusion_neighbours = 10;
   int local_keyframes = 30;
@@ -21,9 +21,10 @@ struct MapperOptions {
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("triangulation_neighbours", self.triangulation_neighbours,
           OptionField{"", 1, 200, "Neighbours of a new keyframe with which new landmarks are triangulated."});
-    visit(
-        "min_baseline_ratio", self.min_baseline_ratio,
-        OptionField{"", 0, 1, "Distance to such a neighbour over the median depth of the scene, at least."});
+    visit("min_baseline_ratio", self.min_baseline_ratio,
+          OptionField{"", 0, 1,
+                      "Distance to such a neighbour over the median depth of the scene, at least: more than "
+                      "min_parallax_deg, as else those pass whose error makes their parallax large."});
     visit("min_parallax_deg", self.min_parallax_deg,
           OptionField{
               "deg", 0, 45,

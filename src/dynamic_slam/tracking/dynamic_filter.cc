@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/geometry/segment.h"
 #include "dynamic_slam/map/static_evidence.h"
 #include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/semantics/selective_tracking.h"
@@ -55,18 +56,14 @@ double Sigmoid(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
 double Square(double x) { return x * x; }
 
-double DistanceToSegment(const Eigen::Vector2d& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  const Eigen::Vector2d along = b - a;
-  const double squared = along.squaredNorm();
-  const double t = squared > 0 ? std::clamp((p - a).dot(along) / squared, 0.0, 1.0) : 0.0;
-  return (p - a - t * along).norm();
-}
-
 }  // namespace
 
 DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options,
                              std::vector<float> octave_scales)
-    : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)) {}
+    : camera_(camera),
+      options_(options),
+      octave_scales_(std::move(octave_scales)),
+      past_views_(camera, octave_scales_) {}
 
 float DynamicFilter::Evidence(float static_probability, bool fits) const {
   if (!options_.landmark_odds || static_probability <= 0) return 0;
@@ -88,6 +85,7 @@ void DynamicFilter::Reset() {
   objects_.clear();
   last_objects_.clear();
   boxes_.clear();
+  past_views_.Clear();
 }
 
 bool DynamicFilter::OnlyBoxesMove(std::span<const PointMotion> motions) const {
@@ -125,8 +123,13 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
       const auto before = std::find_if(last_objects_.begin(), last_objects_.end(), [&](const Object& object) {
         return object.box.track_id == box.track_id;
       });
-      const double motion = before == last_objects_.end() ? 0 : before->motion_log_odds;
-      objects_.push_back({box, weights ? Sigmoid(std::log(p / (1 - p)) + motion) : 1, motion});
+      Object object{.box = box};
+      if (before != last_objects_.end()) {
+        object.motion_log_odds = before->motion_log_odds;
+        object.shifts = before->shifts;
+      }
+      if (weights) object.moves = Sigmoid(std::log(p / (1 - p)) + object.motion_log_odds);
+      objects_.push_back(object);
       boxes_.push_back(box.box);
     }
   }
@@ -262,6 +265,35 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
     return RestPlace{camera_.Project(far), camera_.Project(near)};
   };
   WatchKeypoints(rest, flow, last, frame);
+  if (options_.past_views) AskPastViews(nearest_depth, frame);
+}
+
+void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
+  for (size_t k = 0, m = 0; k < objects_.size(); ++k) {
+    if (m < movers_.size() && movers_[m].object == k) {
+      objects_[k].shifts.Add(movers_[m++].motion.shift_px);
+    } else {
+      objects_[k].shifts.Clear();
+    }
+  }
+  suspects_.clear();
+  for (const Object& object : objects_) {
+    const double margin_px = kCornerRadius + options_.margin_ratio * std::sqrt(object.box.box.Area());
+    const Box& b = object.box.box;
+    suspects_.push_back(
+        {{b.x - margin_px, b.y - margin_px, b.width + 2 * margin_px, b.height + 2 * margin_px},
+         &object.shifts});
+  }
+  is_doubted_.resize(prior_.size());
+  for (size_t i = 0; i < prior_.size(); ++i) is_doubted_[i] = prior_[i] < 1 - options_.missed_object;
+  const std::span<const float> evidence = past_views_.Judge(*frame, is_doubted_, suspects_, nearest_depth);
+  for (size_t i = 0; i < evidence.size(); ++i) {
+    if (evidence[i] == 0) continue;
+    float& odds = frame->motion_log_odds[i];
+    odds = std::clamp(odds + evidence[i], -kMaxStaticLogOdds, kMaxStaticLogOdds);
+    frame->static_probability[i] = Combine(prior_[i], odds);
+  }
+  past_views_.Add(*frame);
 }
 
 void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last, Frame* frame) {

@@ -10,6 +10,7 @@
 #include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/tracking/dynamic_options.h"
 #include "dynamic_slam/tracking/keypoint_flow.h"
+#include "dynamic_slam/tracking/past_views.h"
 
 namespace dynamic_slam {
 
@@ -64,8 +65,9 @@ class DynamicFilter {
   // Something whose class is dynamic.
   struct Object {
     DynamicBox box;
-    double moves;                // P(moves) by its class and its motion so far
+    double moves = 1;            // P(moves) by its class and its motion so far
     double motion_log_odds = 0;  // of moving: what its motion tells beside the class
+    ShiftHistory shifts = {};    // while the pose was known
 
     bool IsMoving() const { return moves >= 0.5; }
   };
@@ -90,18 +92,22 @@ class DynamicFilter {
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
   template <class Rest>
   void WatchKeypoints(const Rest& rest, const KeypointFlow& flow, const Frame& last, Frame* frame) const;
+  void AskPastViews(double nearest_depth, Frame* frame);
   void WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth);
 
   Camera camera_;
   DynamicOptions options_;
   std::vector<float> octave_scales_;
   std::vector<Object> objects_, last_objects_;
-  std::vector<Box> boxes_;    // of objects_
+  std::vector<Box> boxes_;  // of objects_
+  PastViews past_views_;
   std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
-  std::vector<uint8_t> in_box_;  // of each keypoint
+  std::vector<uint8_t> in_box_;      // of each keypoint
+  std::vector<uint8_t> is_doubted_;  // of each keypoint
+  std::vector<PastViews::Object> suspects_;
   BoxMotionEstimator estimator_;
   std::vector<Box> boxes_before_;
   std::vector<Eigen::Vector2d> expected_px_;

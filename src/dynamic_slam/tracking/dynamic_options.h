@@ -19,6 +19,7 @@ struct DynamicOptions {
   double margin_ratio = 0.02;
   double missed_object = 0.05;
   bool motion = true;
+  bool past_views = true;
   bool landmark_odds = true;
   bool more_features = true;
   bool shield_hidden = true;
@@ -41,6 +42,10 @@ struct DynamicOptions {
           OptionField{"", 0.001, 0.5, "P(moves) of a keypoint in no box (weights)."});
     visit("motion", self.motion,
           OptionField{"", 0, 1, "Keypoints in and around boxes are judged by how they move (weights)."});
+    visit("past_views", self.past_views,
+          OptionField{"", 0, 1,
+                      "They are looked for in views of the last quarter of a second too, where an object has "
+                      "moved far enough to be told from what is behind it (weights, with motion)."});
     visit("landmark_odds", self.landmark_odds,
           OptionField{"", 0, 1, "Landmarks gather evidence for being at rest over frames (weights)."});
     visit("more_features", self.more_features,
