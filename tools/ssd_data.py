@@ -14,11 +14,11 @@ import numpy as np
 import torch
 
 CLASSES = ["person", "car", "chair", "tv", "potted plant"]  # labels 1 to 5; 0 is background
-INPUT = (320, 256)  # width, height, px
+INPUT = (384, 256)  # width, height, px
 RENDERED = (400, 300)
 FRAMES_PER_SCENE = 8
-SURE_VISIBLE = 0.2  # objects that are seen less are neither object nor background,
-SURE_SHARE, SURE_VISIBLE_NEAR = 0.06, 0.1  # but for those that fill so much of the image; then this much will do
+SURE_VISIBLE = 0.25  # objects that are seen less are neither object nor background,
+SURE_SHARE, SURE_VISIBLE_NEAR = 0.06, 0.12  # but for those that fill so much of the image; then this much will do
 MIN_HEIGHT_PX = 9  # those that are smaller, in the network's input, are not either
 WEBP_QUALITY = 60  # of the images that are kept; each is varied anyway
 SCENES_PER_PACK = 50

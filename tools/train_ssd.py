@@ -29,10 +29,10 @@ NEGATIVES_PER_POSITIVE = 3
 # Of each grid: its cells, and the (width, height) of its anchors, px of the input. People stand, cars and screens lie.
 # The narrowest stand twice in a cell, side by side.
 GRIDS = [
-    ((40, 32), [(6, 15), (6, 15), (11, 27), (17, 17), (29, 23)]),
-    ((20, 16), [(15, 40), (25, 58), (32, 40), (46, 34), (20, 90)]),
-    ((10, 8), [(34, 90), (48, 130), (60, 74), (84, 60), (36, 160), (66, 190), (48, 235), (95, 240), (100, 130)]),
-    ((5, 4), [(60, 236), (110, 236), (160, 240), (150, 120), (150, 170), (250, 244)]),
+    ((48, 32), [(7, 15), (7, 15), (11, 25), (20, 17), (34, 23)]),
+    ((24, 16), [(16, 38), (28, 56), (38, 40), (55, 34), (24, 90)]),
+    ((12, 8), [(40, 90), (56, 130), (72, 74), (100, 60), (42, 160), (80, 190), (56, 235), (112, 240), (120, 130)]),
+    ((6, 4), [(72, 236), (132, 236), (192, 240), (180, 120), (180, 170), (300, 244)]),
 ]
 
 
@@ -198,7 +198,7 @@ def export(model, anchors, folder):
     with open(folder / "builtin_anchors.txt", "w") as stream:
         stream.write("# center y, center x, height, width, 0 to 1 over the input; written by tools/train_ssd.py\n")
         for x, y, w, h in anchors.tolist():
-            stream.write(f"{y:.5g} {x:.5g} {h:.5g} {w:.5g}\n")
+            stream.write(f"{y:.4g} {x:.4g} {h:.4g} {w:.4g}\n")
     image.uniform_(-1, 1, generator=torch.Generator().manual_seed(1))
     opencv = cv2.dnn.readNetFromONNX(str(file))
     opencv.setInput(image.numpy())
@@ -219,23 +219,23 @@ def state_checksums(folder, detector_file):
 
 def draw_curves(log, file):
     """The losses over the steps, on a logarithmic scale: training blue, unseen scenes red."""
-    width, height, left, bottom = 900, 460, 70, 50
+    width, height, left, right, bottom = 900, 460, 70, 40, 50
     picture = np.full((height, width, 3), 255, np.uint8)
     steps = [row["step"] for row in log]
-    low, high = -1.0, 1.5  # powers of ten
+    low, high = -0.35, 1.05  # powers of ten
 
     def at(step, loss):
-        x = left + (width - left - 20) * step / max(steps[-1], 1)
+        x = left + (width - left - right) * step / max(steps[-1], 1)
         y = height - bottom - (height - bottom - 20) * (np.log10(max(loss, 1e-3)) - low) / (high - low)
         return int(x), int(np.clip(y, 0, height))
 
-    for loss in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20):
+    for loss in (0.5, 1, 2, 5, 10):
         cv2.line(picture, at(0, loss), at(steps[-1], loss), (220, 220, 220), 1)
         cv2.putText(picture, f"{loss:g}", (15, at(0, loss)[1] + 5), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0), 1,
                     cv2.LINE_AA)
     for i in range(6):
         step = steps[-1] * i // 5
-        cv2.putText(picture, f"{step}", (at(step, 0.1)[0] - 15, height - 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0),
+        cv2.putText(picture, f"{step}", (at(step, 1)[0] - 15, height - 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0),
                     1, cv2.LINE_AA)
     for key, color in (("train", (200, 90, 20)), ("unseen", (30, 30, 210))):
         points = np.array([at(row["step"], row[f"{key}_confidence"] + row[f"{key}_location"]) for row in log])
@@ -267,8 +267,9 @@ def main():
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/apps/dynamic_slam")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "out/train_ssd", help="rendered images, checkpoints")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "models")
-    parser.add_argument("--scenes", type=int, default=1200)
-    parser.add_argument("--steps", type=int, default=9000)
+    parser.add_argument("--scenes", type=int, default=900)
+    parser.add_argument("--steps", type=int, default=22000, help="in which the learning rate falls to zero")
+    parser.add_argument("--stop", type=int, default=20800, help="stop after this step; the rate is next to nothing then")
     parser.add_argument("--batch", type=int, default=128)
     parser.add_argument("--rate", type=float, default=4e-3, help="highest learning rate")
     parser.add_argument("--device", default="cpu", help="of PyTorch: cpu or cuda; another one rounds differently")
@@ -299,8 +300,9 @@ def main():
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])
         first, log = state["step"], state["log"]
+    last = min(arguments.stop, arguments.steps)
     varied = RenderedImages(frames, arguments.steps * arguments.batch, seed=1, decoded=arguments.decoded)
-    rest = torch.utils.data.Subset(varied, range(first * arguments.batch, len(varied)))
+    rest = torch.utils.data.Subset(varied, range(first * arguments.batch, last * arguments.batch))
     loader = torch.utils.data.DataLoader(rest, arguments.batch, num_workers=arguments.workers, prefetch_factor=4,
                                          collate_fn=batch_of, pin_memory=device.type == "cuda")
     plain = list(torch.utils.data.DataLoader(RenderedImages(unseen, len(unseen), None), 32, collate_fn=batch_of))
@@ -316,7 +318,7 @@ def main():
         nn.utils.clip_grad_norm_(model.parameters(), 10)
         optimizer.step()
         recent += torch.stack([confidence.detach(), location.detach(), torch.ones_like(location)])
-        if step % 200 == 0 or step == arguments.steps:
+        if step % 200 == 0 or step == last:
             train, other = (recent[:2] / recent[2]).tolist(), unseen_loss(model, plain, anchors, loss)
             recent.zero_()
             log.append({"step": step, "train_confidence": train[0], "train_location": train[1],
