@@ -63,7 +63,8 @@ class InstalledTest(FolderTest):
         os.mkdir(out)
         succeed("cmake", "-S", example, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}")
         succeed("cmake", "--build", build)
-        output = succeed(os.path.join(build, "follow_video"), corridor, os.path.join(corridor, "camera.yaml"), out, env=CLEAN)
+        output = succeed(os.path.join(build, "follow_video"), corridor,
+                         os.path.join(corridor, "camera.yaml"), out, env=CLEAN)
         self.assertRegex(output, r"\d+ poses and 1 parts of a map")
         with open(os.path.join(out, "trajectory.txt")) as file:
             self.assertGreater(sum(not line.startswith("#") for line in file), 40)
