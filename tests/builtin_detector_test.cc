@@ -19,11 +19,13 @@ TEST(BuiltinDetectorTest, ItsFilesAreThereAndSmallAndTheOnesThatWereTrained) {
   const DetectorFile file = ReadDetectorFile(FindConfig("detectors", "detector", "builtin"));
   const std::vector<NetworkFile> files = FindNetworkFiles(file, {});
   ASSERT_EQ(files.size(), 2u);
+  uintmax_t bytes = 0;
   for (const NetworkFile& one : files) {
     ASSERT_TRUE(one.found.has_value()) << one.wanted.file;
     EXPECT_EQ(one.wanted.sha256, Sha256(*one.found)) << one.wanted.file;
-    EXPECT_LE(std::filesystem::file_size(*one.found), 2'000'000u) << one.wanted.file;
+    bytes += std::filesystem::file_size(*one.found);
   }
+  EXPECT_LE(bytes, 2'000'000u);
 }
 
 class BuiltinDetectorSceneTest : public testing::Test {
@@ -62,19 +64,20 @@ class BuiltinDetectorSceneTest : public testing::Test {
   const std::unique_ptr<Detector> detector_ = MakeDetector("builtin");
 };
 
-// The goal is more (docs/builtin_detector.md); this is what must not be lost.
+// What it reaches is more (docs/builtin_detector.md); this must not be lost.
 TEST_F(BuiltinDetectorSceneTest, FindsThePeopleOfACrowd) {
   const DetectionMetrics people = Compare(Scene("crowd", 104), "person");
   ASSERT_GE(people.hits + people.misses, 12u);
-  EXPECT_GE(people.Recall(), 0.7);
-  EXPECT_GE(people.Precision(), 0.5);
+  EXPECT_GE(people.Recall(), 0.8);
+  EXPECT_GE(people.Precision(), 0.7);
+  EXPECT_EQ(people.FrameRecall(), 1.0);
 }
 
 TEST_F(BuiltinDetectorSceneTest, SeesNobodyWhereNobodyIs) {
   SceneOptions options = Scene("office", 105);
   options.people.count = 0;
-  EXPECT_LE(Compare(options, "person").false_alarms, 1u);
-  EXPECT_GE(Compare(options, "").Recall(), 0.5);  // chairs, screens, plants
+  EXPECT_EQ(Compare(options, "person").false_alarms, 0u);
+  EXPECT_GE(Compare(options, "").Recall(), 0.85);  // chairs, screens, plants
 }
 
 }  // namespace

@@ -56,14 +56,15 @@ class InstalledTest(FolderTest):
                                   os.path.join(self.prefix, "share/dynamic_slam"))
 
     def test_a_project_that_is_not_ours_is_built_and_runs(self):
-        room = os.path.join(self.folder, "room")
-        succeed(PROGRAM, "simulate", "room", "--frames", "60", "--out", room)
+        corridor = os.path.join(self.folder, "corridor")
+        succeed(PROGRAM, "simulate", "corridor", "--frames", "60", "--out", corridor)
         example, build, out = (os.path.join(self.folder, name) for name in ("example", "example_build", "example_out"))
         shutil.copytree(os.path.join(SOURCE, "examples/cpp"), example)
         os.mkdir(out)
         succeed("cmake", "-S", example, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}")
         succeed("cmake", "--build", build)
-        output = succeed(os.path.join(build, "follow_video"), room, os.path.join(room, "camera.yaml"), out, env=CLEAN)
+        output = succeed(os.path.join(build, "follow_video"), corridor,
+                         os.path.join(corridor, "camera.yaml"), out, env=CLEAN)
         self.assertRegex(output, r"\d+ poses and 1 parts of a map")
         with open(os.path.join(out, "trajectory.txt")) as file:
             self.assertGreater(sum(not line.startswith("#") for line in file), 40)

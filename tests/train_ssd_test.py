@@ -23,7 +23,7 @@ class MatchTest(unittest.TestCase):
         self.anchors = train_ssd.make_anchors()
 
     def test_codes_give_the_box_back_as_the_decoder_reads_them(self):
-        labels, codes = train_ssd.match(self.anchors, torch.tensor([[2.0, 0.31, 0.2, 0.52, 0.9]]))
+        (labels,), (codes,) = train_ssd.match(self.anchors, torch.tensor([[[2.0, 0.31, 0.2, 0.52, 0.9]]]))
         matched = (labels == 2).nonzero().flatten()
         self.assertGreater(len(matched), 0)
         self.assertEqual(int((labels > 0).sum()), len(matched))
@@ -34,11 +34,11 @@ class MatchTest(unittest.TestCase):
                 self.assertAlmostEqual(value, wanted, 5)
 
     def test_what_fits_no_anchor_well_has_one_all_the_same(self):
-        labels, _ = train_ssd.match(self.anchors, torch.tensor([[5.0, 0.1, 0.5, 0.9, 0.52]]))
+        (labels,), _ = train_ssd.match(self.anchors, torch.tensor([[[5.0, 0.1, 0.5, 0.9, 0.52], [0, 0, 0, 0, 0]]]))
         self.assertEqual(int((labels == 5).sum()), 1)
 
     def test_where_one_cannot_be_sure_there_is_neither_object_nor_background(self):
-        labels, _ = train_ssd.match(self.anchors, torch.tensor([[-1.0, 0.0, 0.0, 0.5, 1.0]]))
+        (labels,), _ = train_ssd.match(self.anchors, torch.tensor([[[-1.0, 0.0, 0.0, 0.5, 1.0]]]))
         box = train_ssd.corners(self.anchors)
         inside = (box[:, 0] >= 0) & (box[:, 1] >= 0) & (box[:, 2] <= 0.5) & (box[:, 3] <= 1)
         self.assertTrue((labels[inside] == -1).all())

@@ -11,6 +11,7 @@ training; docs/builtin_detector.md says what came of it. SSD: Liu et al., "SSD: 
 import argparse
 import csv
 import hashlib
+import math
 import pathlib
 import re
 import time
@@ -20,17 +21,18 @@ import numpy as np
 import torch
 from torch import nn
 
-from ssd_data import CLASSES, INPUT, RenderedImages, read_scenes, render
+from ssd_data import CLASSES, INPUT, RenderedImages, packed_scenes
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 VARIANCE_CENTER, VARIANCE_SIZE = 0.1, 0.2
 NEGATIVES_PER_POSITIVE = 3
 # Of each grid: its cells, and the (width, height) of its anchors, px of the input. People stand, cars and screens lie.
+# The narrowest stand twice in a cell, side by side.
 GRIDS = [
-    ((24, 18), [(7, 17), (10, 25), (18, 14)]),
-    ((12, 9), [(14, 36), (19, 48), (28, 28), (42, 28), (32, 46)]),
-    ((6, 5), [(30, 70), (42, 96), (62, 66), (72, 104), (110, 60)]),
-    ((3, 3), [(48, 122), (66, 140), (92, 120), (110, 142), (150, 90), (185, 142)]),
+    ((48, 32), [(7, 15), (7, 15), (11, 25), (20, 17), (34, 23)]),
+    ((24, 16), [(16, 38), (28, 56), (38, 40), (55, 34), (24, 90)]),
+    ((12, 8), [(40, 90), (56, 130), (72, 74), (100, 60), (42, 160), (80, 190), (56, 235), (112, 240), (120, 130)]),
+    ((6, 4), [(72, 236), (132, 236), (192, 240), (180, 120), (180, 170), (300, 244)]),
 ]
 
 
@@ -40,7 +42,9 @@ def make_anchors():
     for (columns, lines), sizes in GRIDS:
         for y in range(lines):
             for x in range(columns):
-                rows += [[(x + 0.5) / columns, (y + 0.5) / lines, w / INPUT[0], h / INPUT[1]] for w, h in sizes]
+                for i, (w, h) in enumerate(sizes):
+                    aside = 0.5 if sizes.count((w, h)) == 1 else 0.25 + 0.5 * i
+                    rows.append([(x + aside) / columns, (y + 0.5) / lines, w / INPUT[0], h / INPUT[1]])
     return torch.tensor(rows, dtype=torch.float32)
 
 
@@ -49,9 +53,17 @@ def convolution(inputs, outputs, size, stride=1, groups=1):
                          nn.BatchNorm2d(outputs), nn.ReLU(inplace=True))
 
 
-def block(inputs, outputs, stride=1):
-    """A depthwise separable convolution."""
-    return nn.Sequential(convolution(inputs, inputs, 3, stride, inputs), convolution(inputs, outputs, 1))
+class Block(nn.Module):
+    """A depthwise separable convolution; what comes in is added where it has the same shape."""
+
+    def __init__(self, inputs, outputs, stride=1):
+        super().__init__()
+        self.layers = nn.Sequential(convolution(inputs, inputs, 3, stride, inputs),
+                                    nn.Sequential(nn.Conv2d(inputs, outputs, 1, bias=False), nn.BatchNorm2d(outputs)))
+        self.adds = inputs == outputs and stride == 1
+
+    def forward(self, x):
+        return torch.relu(self.layers(x) + x if self.adds else self.layers(x))
 
 
 class Head(nn.Module):
@@ -73,13 +85,17 @@ class SmallSsd(nn.Module):
     def __init__(self):
         super().__init__()
         self.stages = nn.ModuleList([
-            nn.Sequential(convolution(3, 16, 3, 2), block(16, 32, 2), block(32, 32), block(32, 64, 2), block(64, 64),
-                          block(64, 64)),
-            nn.Sequential(block(64, 128, 2), block(128, 128), block(128, 128), block(128, 128), block(128, 128)),
-            nn.Sequential(block(128, 256, 2), block(256, 256), block(256, 256)),
-            nn.Sequential(block(256, 256, 2)),
+            nn.Sequential(convolution(3, 16, 3, 2), Block(16, 32, 2), Block(32, 32), Block(32, 32), Block(32, 64, 2),
+                          *(Block(64, 64) for _ in range(4))),
+            nn.Sequential(Block(64, 128, 2), *(Block(128, 128) for _ in range(4))),
+            nn.Sequential(Block(128, 192, 2), *(Block(192, 192) for _ in range(2))),
+            nn.Sequential(Block(192, 128, 2), Block(128, 128)),
         ])
-        channels = [64, 128, 256, 256]
+        # What coarse grids see is added to the finer ones: small things are told by what is around them.
+        channels = [64, 96, 128, 128]
+        self.across = nn.ModuleList(nn.Conv2d(i, o, 1) for i, o in zip([64, 128, 192], channels))
+        self.down = nn.ModuleList(nn.Conv2d(i, o, 1, bias=False) for i, o in zip(channels[1:], channels))
+        self.joined = nn.ModuleList(Block(c, c) for c in channels[:-1])
         self.codes = nn.ModuleList(Head(c, len(sizes), 4) for c, (_, sizes) in zip(channels, GRIDS))
         self.scores = nn.ModuleList(Head(c, len(sizes), len(CLASSES) + 1) for c, (_, sizes) in zip(channels, GRIDS))
         for head in self.scores:  # at first nearly everything is background
@@ -90,6 +106,9 @@ class SmallSsd(nn.Module):
         for stage in self.stages:
             x = stage(x)
             features.append(x)
+        for i in (2, 1, 0):
+            above = nn.functional.interpolate(self.down[i](features[i + 1]), scale_factor=2.0, mode="nearest")
+            features[i] = self.joined[i](torch.relu(self.across[i](features[i]) + above))
         codes = torch.cat([head(f) for head, f in zip(self.codes, features)], dim=1)
         scores = torch.cat([head(f) for head, f in zip(self.scores, features)], dim=1)
         return codes, scores if self.training else torch.softmax(scores, dim=2)
@@ -100,35 +119,34 @@ def corners(boxes):
 
 
 def overlaps(a, b):
-    """Of each box (corners) of `a` with each of `b`: the intersection over the union, and over the box of `a`."""
-    low, high = torch.maximum(a[:, None, :2], b[None, :, :2]), torch.minimum(a[:, None, 2:], b[None, :, 2:])
-    common = (high - low).clamp(min=0).prod(dim=2)
-    area_a, area_b = (a[:, 2:] - a[:, :2]).prod(dim=1)[:, None], (b[:, 2:] - b[:, :2]).prod(dim=1)[None]
+    """Of each box (corners) of `a` with each of b[i]: the intersection over the union, and over the box of `a`."""
+    a, b = a[None, :, None], b[:, None]
+    width, height = ((torch.minimum(a[..., i + 2], b[..., i + 2]) - torch.maximum(a[..., i], b[..., i])).clamp(min=0)
+                     for i in (0, 1))
+    common = width * height
+    area_a, area_b = ((c[..., 2] - c[..., 0]) * (c[..., 3] - c[..., 1]) for c in (a, b))
     return common / (area_a + area_b - common).clamp(min=1e-9), common / area_a.clamp(min=1e-9)
 
 
 def match(anchors, truth):
-    """The label of each anchor (0: background, -1: neither) and its codes, for an image's rows of label and corners."""
-    labels, codes = torch.zeros(len(anchors), dtype=torch.long), torch.zeros(len(anchors), 4)
-    unsure, truth = truth[truth[:, 0] < 0], truth[truth[:, 0] > 0]
-    if len(unsure) > 0:
-        labels[overlaps(corners(anchors), unsure[:, 1:])[1].amax(dim=1) > 0.5] = -1
-    if len(truth) == 0:
-        return labels, codes
-    iou, _ = overlaps(corners(anchors), truth[:, 1:])
-    best, object_of = iou.max(dim=1)
-    favourite = iou.argmax(dim=0)  # each object has its best anchor in any case
-    object_of[favourite], best[favourite] = torch.arange(len(truth)), 1.0
-    # Less than SSD's 0.5: with few anchors that gives an object two on average, and learning is slow.
-    labels[best >= 0.3] = -1
-    positive = best >= 0.4
-    labels[positive] = truth[object_of[positive], 0].long()
-    box, a = truth[object_of, 1:], anchors
-    size = (box[:, 2:] - box[:, :2]).clamp(min=1e-4)
-    center = (box[:, :2] + box[:, 2:]) / 2
-    offset = (center - a[:, :2]) / a[:, 2:] / VARIANCE_CENTER
-    growth = torch.log(size / a[:, 2:]) / VARIANCE_SIZE
-    return labels, torch.stack([offset[:, 1], offset[:, 0], growth[:, 1], growth[:, 0]], dim=1)
+    """The labels of the anchors (0: background, -1: neither) and their codes, images x anchors (x 4).
+
+    `truth`: images x objects x (label, corners), label 0: no object, it fills the row.
+    """
+    is_object, is_unsure = truth[:, None, :, 0] > 0, truth[:, None, :, 0] < 0
+    iou, inside = overlaps(corners(anchors), truth[..., 1:])
+    iou = iou * is_object
+    favourite = iou.argmax(dim=1, keepdim=True)  # each object has its best anchor in any case
+    iou.scatter_(1, favourite, iou.gather(1, favourite) + 2.0 * is_object)
+    best, object_of = iou.max(dim=2)
+    labels = torch.where((best >= 0.35) | ((inside > 0.5) & is_unsure).any(dim=2), -1, 0)
+    # Less than SSD's 0.5: narrow objects would have hardly any.
+    labels = torch.where(best >= 0.45, truth[..., 0].long().gather(1, object_of), labels)
+    box = truth[..., 1:].gather(1, object_of[..., None].expand(-1, -1, 4))
+    size, center = (box[..., 2:] - box[..., :2]).clamp(min=1e-4), (box[..., :2] + box[..., 2:]) / 2
+    offset = (center - anchors[:, :2]) / anchors[:, 2:] / VARIANCE_CENTER
+    growth = torch.log(size / anchors[:, 2:]) / VARIANCE_SIZE
+    return labels, torch.stack([offset[..., 1], offset[..., 0], growth[..., 1], growth[..., 0]], dim=2)
 
 
 class Loss(nn.Module):
@@ -149,15 +167,10 @@ class Loss(nn.Module):
         return confidence, location
 
 
-class Batches:
-    """Images with what is wanted of each anchor."""
-
-    def __init__(self, anchors):
-        self.anchors = anchors
-
-    def __call__(self, samples):
-        labels, codes = zip(*(match(self.anchors, truth) for _, truth in samples))
-        return torch.stack([image for image, _ in samples]), torch.stack(labels), torch.stack(codes)
+def batch_of(samples):
+    """Images, and their objects, as many rows for each: rows of zeros are none."""
+    objects = nn.utils.rnn.pad_sequence([torch.cat([truth, torch.zeros(1, 5)]) for _, truth in samples], True)
+    return torch.stack([image for image, _ in samples]), objects
 
 
 def normalised(images):
@@ -185,7 +198,7 @@ def export(model, anchors, folder):
     with open(folder / "builtin_anchors.txt", "w") as stream:
         stream.write("# center y, center x, height, width, 0 to 1 over the input; written by tools/train_ssd.py\n")
         for x, y, w, h in anchors.tolist():
-            stream.write(f"{y:.7f} {x:.7f} {h:.7f} {w:.7f}\n")
+            stream.write(f"{y:.4g} {x:.4g} {h:.4g} {w:.4g}\n")
     image.uniform_(-1, 1, generator=torch.Generator().manual_seed(1))
     opencv = cv2.dnn.readNetFromONNX(str(file))
     opencv.setInput(image.numpy())
@@ -206,23 +219,23 @@ def state_checksums(folder, detector_file):
 
 def draw_curves(log, file):
     """The losses over the steps, on a logarithmic scale: training blue, unseen scenes red."""
-    width, height, left, bottom = 900, 460, 70, 50
+    width, height, left, right, bottom = 900, 460, 70, 40, 50
     picture = np.full((height, width, 3), 255, np.uint8)
     steps = [row["step"] for row in log]
-    low, high = -1.0, 1.5  # powers of ten
+    low, high = -0.35, 1.05  # powers of ten
 
     def at(step, loss):
-        x = left + (width - left - 20) * step / max(steps[-1], 1)
+        x = left + (width - left - right) * step / max(steps[-1], 1)
         y = height - bottom - (height - bottom - 20) * (np.log10(max(loss, 1e-3)) - low) / (high - low)
         return int(x), int(np.clip(y, 0, height))
 
-    for loss in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20):
+    for loss in (0.5, 1, 2, 5, 10):
         cv2.line(picture, at(0, loss), at(steps[-1], loss), (220, 220, 220), 1)
         cv2.putText(picture, f"{loss:g}", (15, at(0, loss)[1] + 5), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0), 1,
                     cv2.LINE_AA)
     for i in range(6):
         step = steps[-1] * i // 5
-        cv2.putText(picture, f"{step}", (at(step, 0.1)[0] - 15, height - 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0),
+        cv2.putText(picture, f"{step}", (at(step, 1)[0] - 15, height - 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0),
                     1, cv2.LINE_AA)
     for key, color in (("train", (200, 90, 20)), ("unseen", (30, 30, 210))):
         points = np.array([at(row["step"], row[f"{key}_confidence"] + row[f"{key}_location"]) for row in log])
@@ -231,23 +244,22 @@ def draw_curves(log, file):
 
 
 def rate_share(step, steps):
-    """Of the highest learning rate: it rises, stays, and falls to zero in the last third.
-
-    So a checkpoint from before the last third can be ended with any number of steps, as if that had been planned.
-    """
-    return min(step / 100, 1.0, (steps - step) / (steps / 3))
+    """Of the highest learning rate: it rises in the first 3%, and falls along a cosine to zero."""
+    rise = 0.03 * steps
+    return step / rise if step < rise else 0.5 + 0.5 * math.cos(math.pi * (step - rise) / (steps - rise))
 
 
-def unseen_loss(model, loader, loss):
+def unseen_loss(model, batches, anchors, loss):
     """Both parts of the loss on images of other scenes, as they are."""
     parts = []
     model.eval()
     with torch.no_grad():
-        for images, labels, codes in loader:
-            predicted, scores = model(normalised(images))
-            parts.append([float(part) for part in loss(predicted, torch.log(scores.clamp(min=1e-9)), labels, codes)])
+        for images, objects in batches:
+            codes, scores = model(normalised(images.to(anchors.device)))
+            wanted = match(anchors, objects.to(anchors.device))
+            parts.append([float(part) for part in loss(codes, torch.log(scores.clamp(min=1e-9)), *wanted)])
     model.train()
-    return np.mean(parts, axis=0)
+    return np.mean(parts, axis=0).tolist()
 
 
 def main():
@@ -255,58 +267,69 @@ def main():
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/apps/dynamic_slam")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "out/train_ssd", help="rendered images, checkpoints")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "models")
-    parser.add_argument("--scenes", type=int, default=180)
-    parser.add_argument("--steps", type=int, default=6000)
-    parser.add_argument("--batch", type=int, default=16)
-    parser.add_argument("--rate", type=float, default=6e-3, help="highest learning rate")
+    parser.add_argument("--scenes", type=int, default=900)
+    parser.add_argument("--steps", type=int, default=22000, help="in which the learning rate falls to zero")
+    parser.add_argument("--stop", type=int, default=20800, help="stop after this step; the rate is next to nothing then")
+    parser.add_argument("--batch", type=int, default=128)
+    parser.add_argument("--rate", type=float, default=4e-3, help="highest learning rate")
+    parser.add_argument("--device", default="cpu", help="of PyTorch: cpu or cuda; another one rounds differently")
     parser.add_argument("--threads", type=int, default=1, help="of PyTorch; another number rounds differently")
+    parser.add_argument("--workers", type=int, default=1, help="processes that vary images; does not change the result")
+    parser.add_argument("--decoded", action="store_true", help="hold images as pixels: faster, 5 GB of memory")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in --work")
+    parser.add_argument("--no-export", action="store_true", help="leave the files to a later call with --resume")
     arguments = parser.parse_args()
 
     torch.manual_seed(1)
     torch.set_num_threads(arguments.threads)
+    torch.backends.cudnn.deterministic = True
+    device = torch.device(arguments.device)
     program = arguments.program.resolve()
     data = arguments.work.resolve() / "data"
-    frames = read_scenes(render(program, data, range(1000, 1000 + arguments.scenes), 2))
-    unseen = read_scenes(render(program, data, range(9000, 9012), 2))
+    frames = packed_scenes(program, data, range(1000, 1000 + arguments.scenes), 2)
+    unseen = packed_scenes(program, data, range(9000, 9000 + 40), 2)
     print(f"{len(frames)} images of {arguments.scenes} scenes, {len(unseen)} of others", flush=True)
 
-    anchors, loss = make_anchors(), Loss()
-    model = SmallSsd().to(memory_format=torch.channels_last)  # faster by a quarter
+    anchors, loss = make_anchors().to(device), Loss()
+    model = SmallSsd().to(device, memory_format=torch.channels_last)  # faster by a quarter
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(anchors)} anchors", flush=True)
     optimizer = torch.optim.AdamW(model.parameters(), lr=arguments.rate, weight_decay=1e-3)
     first, log, checkpoint = 0, [], arguments.work / "checkpoint.pt"
     if arguments.resume:
-        state = torch.load(checkpoint)
+        state = torch.load(checkpoint, map_location=device)
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])
         first, log = state["step"], state["log"]
-    varied = RenderedImages(frames, arguments.steps * arguments.batch, seed=1)
-    rest = torch.utils.data.Subset(varied, range(first * arguments.batch, len(varied)))
-    loader = torch.utils.data.DataLoader(rest, arguments.batch, num_workers=1, prefetch_factor=4,
-                                         collate_fn=Batches(anchors))
-    plain = torch.utils.data.DataLoader(RenderedImages(unseen, len(unseen), None), 28, collate_fn=Batches(anchors))
+    last = min(arguments.stop, arguments.steps)
+    varied = RenderedImages(frames, arguments.steps * arguments.batch, seed=1, decoded=arguments.decoded)
+    rest = torch.utils.data.Subset(varied, range(first * arguments.batch, last * arguments.batch))
+    loader = torch.utils.data.DataLoader(rest, arguments.batch, num_workers=arguments.workers, prefetch_factor=4,
+                                         collate_fn=batch_of, pin_memory=device.type == "cuda")
+    plain = list(torch.utils.data.DataLoader(RenderedImages(unseen, len(unseen), None), 32, collate_fn=batch_of))
     arguments.out.mkdir(parents=True, exist_ok=True)
-    recent, begin, model = [], time.time(), model.train()
-    for step, (images, labels, codes) in enumerate(loader, start=first + 1):
+    recent, begin, model = torch.zeros(3, device=device), time.time(), model.train()
+    for step, batch in enumerate(loader, start=first + 1):
+        images, objects = (part.to(device, non_blocking=True) for part in batch)
         for group in optimizer.param_groups:
             group["lr"] = arguments.rate * rate_share(step, arguments.steps)
-        confidence, location = loss(*model(normalised(images)), labels, codes)
+        confidence, location = loss(*model(normalised(images)), *match(anchors, objects))
         optimizer.zero_grad()
         (confidence + location).backward()
         nn.utils.clip_grad_norm_(model.parameters(), 10)
         optimizer.step()
-        recent.append([float(confidence), float(location)])
-        if step % 100 == 0 or step == arguments.steps:
-            train, other = np.mean(recent, axis=0), unseen_loss(model, plain, loss)
-            recent = []
+        recent += torch.stack([confidence.detach(), location.detach(), torch.ones_like(location)])
+        if step % 200 == 0 or step == last:
+            train, other = (recent[:2] / recent[2]).tolist(), unseen_loss(model, plain, anchors, loss)
+            recent.zero_()
             log.append({"step": step, "train_confidence": train[0], "train_location": train[1],
                         "unseen_confidence": other[0], "unseen_location": other[1]})
             print(f"step {step}: training {train[0]:.3f} + {train[1]:.3f}, unseen scenes {other[0]:.3f} + "
-                  f"{other[1]:.3f}; {(time.time() - begin) / 60:.1f} min", flush=True)
+                  f"{other[1]:.3f}; {time.time() - begin:.0f} s", flush=True)
             torch.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(),
                         "step": step, "log": log}, checkpoint)
-            export(model, anchors, arguments.out)
+    if arguments.no_export:
+        return
+    export(model, anchors, arguments.out)
     if arguments.out.resolve() == ROOT / "models":
         state_checksums(arguments.out, ROOT / "config/detectors/builtin.yaml")
     with open(arguments.out / "builtin_training.csv", "w", newline="") as stream:
