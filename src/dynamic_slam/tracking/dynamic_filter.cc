@@ -16,11 +16,6 @@
 namespace dynamic_slam {
 namespace {
 
-// A corner is found where a circle of this radius, in px of its octave, differs from its centre (Rosten and
-// Drummond 2006): so near to an outline it is made of the object and of what is behind it, and moves with
-// neither.
-constexpr double kCornerRadius = 3;
-
 // Nothing at rest is expected nearer than this part of the median depth.
 constexpr double kNearestDepthRatio = 0.3;
 
@@ -278,11 +273,8 @@ void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
   }
   suspects_.clear();
   for (const Object& object : objects_) {
-    const double margin_px = kCornerRadius + options_.margin_ratio * std::sqrt(object.box.box.Area());
-    const Box& b = object.box.box;
-    suspects_.push_back(
-        {{b.x - margin_px, b.y - margin_px, b.width + 2 * margin_px, b.height + 2 * margin_px},
-         &object.shifts});
+    const Box& box = object.box.box;
+    suspects_.push_back({box, options_.margin_ratio * std::sqrt(box.Area()), &object.shifts});
   }
   is_doubted_.resize(prior_.size());
   for (size_t i = 0; i < prior_.size(); ++i) is_doubted_[i] = prior_[i] < 1 - options_.missed_object;

@@ -113,8 +113,8 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
     const Keypoint& keypoint = frame.features.keypoints[i];
     const Descriptor& descriptor = frame.features.descriptors[i];
     const Eigen::Vector2d px(keypoint.x, keypoint.y);
-    const double radius_px =
-        kGate * std::numbers::sqrt2 * octave_scales_[static_cast<size_t>(keypoint.octave)];
+    const double scale = octave_scales_[static_cast<size_t>(keypoint.octave)];
+    const double radius_px = kGate * std::numbers::sqrt2 * scale, outline_px = kCornerRadius * scale;
     // At rest it was on the epipolar line between infinity and the nearest depth, or where its landmark is.
     const Eigen::Vector3d far = rotation * camera_.Unproject(px);
     const Eigen::Vector3d near = nearest_depth * far + view_from_frame.translation;
@@ -127,7 +127,8 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
     int with_any = 257;
     bool is_clear = true;
     for (size_t k = 0; k < objects.size(); ++k) {
-      if (!objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y)) continue;
+      if (!objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y, objects[k].margin_px + outline_px))
+        continue;
       const std::optional<Eigen::Vector2d> shift_px = objects[k].shifts->Sum(steps);
       const Eigen::Vector2d carried_px = px - shift_px.value_or(Eigen::Vector2d::Zero());
       const double apart_px = shift_px ? DistanceToSegment(carried_px, far_px, near_px) : 0;

@@ -15,6 +15,11 @@
 
 namespace dynamic_slam {
 
+// A corner is found where a circle of this radius, in px of its octave, differs from its centre (Rosten and
+// Drummond 2006): so near to an outline it is made of the object and of what is behind it, and moves with
+// neither.
+inline constexpr double kCornerRadius = 3;
+
 // How an object moved in the image from frame to frame, the newest last, px.
 class ShiftHistory {
  public:
@@ -36,7 +41,8 @@ class PastViews {
  public:
   // Who may have carried a keypoint.
   struct Object {
-    Box box;  // in the frame, raw px, with its margin
+    Box box;               // in the frame, raw px
+    double margin_px = 0;  // by which it may reach out of the box
     const ShiftHistory* shifts = nullptr;
   };
 

@@ -61,7 +61,7 @@ class PastViewsTest : public ::testing::Test {
     }
     shifts.Add({told_step_px, 0});
     last_ = MakeFrame(kFrames - 1, person_step_px);
-    const std::vector<PastViews::Object> objects{{PersonBox(), &shifts}};
+    const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
     const std::vector<uint8_t> all(last_.features.size(), 1);
     return views_.Judge(last_, all, objects, 0.3 * kDepth);
   }
@@ -144,7 +144,7 @@ TEST_F(PastViewsTest, ACornerThatIsNewIsAsWhatIsAroundIt) {
   }
   last_.grid.Build(last_.features, camera_.IdealBounds());
   last_.ClearLandmarks();
-  const std::vector<PastViews::Object> objects{{PersonBox(), &shifts}};
+  const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
   const std::vector<uint8_t> all(last_.features.size(), 1);
   const std::span<const float> evidence = views_.Judge(last_, all, objects, 0.3 * kDepth);
   for (size_t i = 0; i < n; ++i) {
