@@ -11,6 +11,7 @@
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "source_arguments.h"
+#include "unmatched_inputs.h"
 
 namespace dynamic_slam {
 namespace {
@@ -62,17 +63,20 @@ BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_
   const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
   run.system = std::make_unique<SlamSystem>(camera, options);
   RunRecorder recorder(source_name, camera, options.image);
-  run.system->SetDetector(
-      recorder.Record(MakeDetector(DetectorFor(arguments.detector, source_name), arguments.models)));
+  const std::string detector = DetectorFor(arguments.detector, source_name);
+  run.system->SetDetector(recorder.Record(MakeDetector(detector, arguments.models)));
+  UnmatchedInputs unmatched(detector, std::nullopt, *console);
   RunControl control = console->Control();
   control.on_frame = [&](const RunProgress& progress) {
     console->Show(progress);
     recorder.Watch(progress);
+    unmatched.Watch(*progress.image);
     if (on_frame) on_frame(progress);
   };
   run.summary = RunSequence(*source, *run.system, control);
   run.summary.source = source_name;
   console->End();
+  unmatched.Finish();
   if (run.summary.failure != nullptr) std::rethrow_exception(run.summary.failure);
   run.record = recorder.Finish(run.summary, LoadGroundTruth(source_name));
   return run;

@@ -83,6 +83,8 @@ BoardViews FindViews(const Board& board, const RunConsole& console, FrameSource*
   }
   fmt::print("images    {} of {} searched, board in {} of them, {} views that differ\n", searched, images,
              found, views.views().size());
+  for (const SourceProblem& problem : source->Problems())
+    fmt::print("skipped   {}: {}\n", problem.name, problem.reason);
   return views;
 }
 

@@ -31,12 +31,14 @@ std::vector<BoxRecord> MoversOf(std::vector<BoxRecord> records) {
   return records;
 }
 
+std::filesystem::path TrueBoxes(const std::filesystem::path& sequence) { return sequence / "boxes.csv"; }
+
 std::vector<BoxRecord> TrueMovers(const std::filesystem::path& sequence, std::span<const double> stamps_s,
                                   const ImagePreparer& preparer) {
-  if (!std::filesystem::exists(sequence / "boxes.csv")) return {};
+  if (!std::filesystem::exists(TrueBoxes(sequence))) return {};
   std::set<int64_t> wanted;
   for (const double stamp_s : stamps_s) wanted.insert(Microseconds(stamp_s));
-  std::vector<BoxRecord> movers = MoversOf(ReadBoxFile(sequence / "boxes.csv"));
+  std::vector<BoxRecord> movers = MoversOf(ReadBoxFile(TrueBoxes(sequence)));
   std::erase_if(movers,
                 [&](const BoxRecord& record) { return !wanted.contains(Microseconds(record.timestamp_s)); });
   const BoxMapping mapping = preparer.box_mapping();

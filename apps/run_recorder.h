@@ -15,7 +15,7 @@ class RunRecorder {
   // source: boxes.csv in that folder are the true boxes.
   RunRecorder(std::filesystem::path source, const Camera& raw_camera, const ImageOptions& options);
 
-  // The same detector, whose answers are kept; null for null.
+  // The same detector, whose answers are kept where there are true boxes; null for null.
   std::shared_ptr<Detector> Record(std::shared_ptr<Detector> detector);
 
   // To be called after each frame.
@@ -26,6 +26,7 @@ class RunRecorder {
 
  private:
   std::filesystem::path source_;
+  bool has_true_boxes_;  // else boxes are compared with nothing, and none are kept: a run may last for hours
   ImagePreparer preparer_;
   FrameChoice frames_;
   std::shared_ptr<RecordingDetector> detector_;

@@ -56,6 +56,15 @@ class CliBenchTest(unittest.TestCase):
             self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.05 * row["path_m"])
             self.assertEqual(row["common_ape_m"] is None, row["failed"])
 
+    def test_boxes_of_another_sequence_are_told(self):
+        boxes = os.path.join(self.shared, "others.csv")
+        with open(boxes, "w", encoding="utf-8") as file:
+            file.write("timestamp,class,score,x,y,w,h\n1e9,person,0.9,320,0,320,480\n")
+        result = run_program("bench", "scale", self.room, "--max-frames", "10", "--detector", "boxes:" + boxes, "--out",
+                             os.path.join(self.shared, "others"), "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn(f"warning: {boxes} has boxes for none of 10 images", result.stderr)
+
     def test_loops_runs_with_and_without_closing(self):
         # Forward, then the same images backward, so that each place is seen twice.
         again = os.path.join(self.shared, "again")

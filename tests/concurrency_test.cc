@@ -27,11 +27,18 @@ using testing::IsEmpty;
 constexpr uint64_t kSeeds = 200;
 constexpr uint64_t kShards = 8;
 
-// As many as DYNAMIC_SLAM_SEEDS says, for a long search.
-uint64_t SeedsOr(uint64_t usual) {
-  const char* const wish = std::getenv("DYNAMIC_SLAM_SEEDS");
+uint64_t NumberOr(const char* variable, uint64_t usual) {
+  const char* const wish = std::getenv(variable);
   return wish == nullptr ? usual : std::strtoull(wish, nullptr, 10);
 }
+
+// Up to that of DYNAMIC_SLAM_SEEDS, for a long search, and from that of DYNAMIC_SLAM_FIRST_SEED, for one seed
+// again.
+uint64_t SeedsOr(uint64_t usual) { return NumberOr("DYNAMIC_SLAM_SEEDS", usual); }
+uint64_t FirstSeed() { return NumberOr("DYNAMIC_SLAM_FIRST_SEED", 0); }
+
+// Whether there are enough of them for all that may happen to have happened.
+bool IsSearch() { return FirstSeed() + kSeeds <= SeedsOr(kSeeds); }
 
 // What happens in the middle of a run.
 enum class Event { kNone, kReset, kLoss, kStop };
@@ -124,6 +131,7 @@ TEST_P(ShuffledTest, EveryOrderOfTheStagesGivesAValidMapAndTheRightPath) {
   const Trajectory& truth = SmallRoom::Get().room.truth();
   int abandoned = 0, stopped = 0;
   for (uint64_t seed = GetParam(); seed < SeedsOr(kSeeds); seed += kShards) {
+    if (seed < FirstSeed()) continue;
     const Event event = static_cast<Event>((seed / kShards) % 4);
     SCOPED_TRACE(fmt::format("seed {} event {}", seed, static_cast<int>(event)));
     ShuffledRun run;
@@ -136,6 +144,7 @@ TEST_P(ShuffledTest, EveryOrderOfTheStagesGivesAValidMapAndTheRightPath) {
     abandoned += run.mapping.keyframes_abandoned;
     stopped += run.mapping.bundles_stopped;
   }
+  if (!IsSearch()) return;
   EXPECT_GT(abandoned, 0) << "no map was given up while mapping was busy with it";
   EXPECT_GT(stopped, 0) << "no bundle adjustment was interrupted";
 }
@@ -232,7 +241,7 @@ bool CloseLoop(Executor& executor, LoopEnd end) {
 
 TEST(ShuffledLoopTest, ALoopIsClosedInAnyOrderOfTheStages) {
   int closed = 0, not_closed = 0;  // of those that were stopped or given up
-  for (uint64_t seed = 0; seed < SeedsOr(60); ++seed) {
+  for (uint64_t seed = FirstSeed(); seed < SeedsOr(60); ++seed) {
     SCOPED_TRACE(fmt::format("seed {}", seed));
     const LoopEnd end = static_cast<LoopEnd>(seed % 3);
     ShuffledExecutor executor(seed);
@@ -243,6 +252,7 @@ TEST(ShuffledLoopTest, ALoopIsClosedInAnyOrderOfTheStages) {
       ++(is_closed ? closed : not_closed);
     }
   }
+  if (FirstSeed() > 0) return;
   EXPECT_GT(closed, 0) << "none was stopped after the correction";
   EXPECT_GT(not_closed, 0) << "none was stopped before it";
 }

@@ -135,6 +135,21 @@ class DocsTest(unittest.TestCase):
         self.assertIn("gives 7 images", result.stderr)
         self.assertNotIn("searched", result.stdout)
 
+    def test_calibrate_names_the_images_that_cannot_be_read(self):
+        folder = os.path.join(self.folder, "photos")
+        os.makedirs(folder)
+        for i, image in enumerate(board_images()):
+            cv2.imwrite(os.path.join(folder, f"{i:02}.png"), image)
+        for name in ("00.png", "05.png"):
+            os.truncate(os.path.join(folder, name), 1000)
+        camera = os.path.join(self.folder, "photos.yaml")
+        result = run_program("calibrate", folder, "--board", "9x6", "--square", "0.025", "--out", camera)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        skipped = [line for line in result.stdout.splitlines() if line.startswith("skipped")]
+        self.assertEqual(len(skipped), 2, result.stdout)
+        self.assertIn("00.png", skipped[0])
+        self.assertTrue(os.path.exists(camera))
+
     def test_a_scale_that_says_nothing_is_refused_before_the_run(self):
         result = run_program("run", "room", "--scale-from", "height:1.6", cwd=self.folder)
         self.assertEqual(result.returncode, 2)

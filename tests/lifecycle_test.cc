@@ -25,7 +25,7 @@ using testing::IsEmpty;
 // The system's own executor, whose tasks can be made to throw or to wait for the wish to stop.
 class FaultyExecutor : public Executor {
  public:
-  enum class Fault { kNone, kThrow, kWaitForStop };
+  enum class Fault { kNone, kThrow, kWaitForStop, kThrowInTracking };
 
   explicit FaultyExecutor(RunMode mode)
       : executor_(mode == RunMode::kOffline ? MakeInlineExecutor() : MakeThreadedExecutor()) {}
@@ -38,7 +38,11 @@ class FaultyExecutor : public Executor {
       done += lane == Lane::kMapping;
     });
   }
-  int Waiting(Lane lane) const override { return executor_->Waiting(lane); }
+  int Waiting(Lane lane) const override {
+    // It is tracking that asks, when it has begun with an image.
+    if (fault == Fault::kThrowInTracking) throw std::runtime_error("no more memory");
+    return executor_->Waiting(lane);
+  }
   void Drain(Lane lane) override { executor_->Drain(lane); }
   void Cancel() override { executor_->Cancel(); }
   void ThrowIfFailed() const override { executor_->ThrowIfFailed(); }
@@ -188,6 +192,13 @@ TEST_P(LifecycleTest, AnErrorInTrackingReachesTheCaller) {
   const cv::Mat wrong_mask = cv::Mat::zeros(3, 3, CV_8UC1);
   EXPECT_THROW(system_->Process(room_.Stamp(10), room_.image(10), wrong_mask), InternalError);
   ExpectGood(10);
+  EXPECT_EQ(Process(10).tracking.state, TrackingState::kTracking) << "nothing was changed";
+  executor_->fault = FaultyExecutor::Fault::kThrowInTracking;
+  EXPECT_THROW(Process(11), std::runtime_error);
+  executor_->fault = FaultyExecutor::Fault::kNone;
+  EXPECT_THROW(Process(12), std::runtime_error) << "the image before was left half done";
+  EXPECT_THROW(system_->Finish(), std::runtime_error);
+  ExpectGood(11);
   system_->Reset();
   Play(kFrames);
   system_->Finish();

@@ -236,6 +236,16 @@ TEST_F(FrameSourceTest, ReadsEurocFromEachOfItsFolders) {
   }
 }
 
+TEST_F(FrameSourceTest, ALineOfEurocWithoutStampOrFileCostsOneFrame) {
+  Write("mav0/cam0/data.csv", ",\n1403636579763555584,one.png\n,,\n1403636579813555456\n");
+  WriteImage("mav0/cam0/data/one.png", Image(1));
+  const auto source = OpenFrameSource(folder_);
+  EXPECT_THAT(Levels(source.get()), ElementsAre(1));
+  ASSERT_EQ(source->Problems().size(), 3u);
+  EXPECT_EQ(source->Problems()[0].name, "data.csv:1");
+  EXPECT_EQ(source->Problems()[0].reason, "',' is not 'nanoseconds,file'");
+}
+
 TEST_F(FrameSourceTest, ReadsImagesInNaturalOrderAtTheGivenRate) {
   for (const int i : {1, 2, 10}) WriteImage(fmt::format("img{}.png", i), Image(i));
   Write("notes.txt", "not an image");

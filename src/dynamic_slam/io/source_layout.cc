@@ -109,9 +109,11 @@ SourceListing ListEuroc(const fs::path& folder, const fs::path& cam0) {
   SourceListing listing{"euroc", folder, cam0 / "sensor.yaml", {}};
   for (const TextLine& line : ReadDataLines(index)) {
     const std::vector<std::string_view> columns = SplitColumns(line.text, ",");
+    const std::string_view stamp =
+        columns.empty() ? std::string_view() : columns[0];  // there may be only commas
     int64_t stamp_ns = 0;
-    const char* last = columns[0].data() + columns[0].size();
-    const auto [end, error] = std::from_chars(columns[0].data(), last, stamp_ns);
+    const char* last = stamp.data() + stamp.size();
+    const auto [end, error] = std::from_chars(stamp.data(), last, stamp_ns);
     if (columns.size() != 2 || error != std::errc() || end != last) {
       listing.entries.push_back(
           Broken(index, line, fmt::format("'{}' is not 'nanoseconds,file'", line.text)));

@@ -103,6 +103,52 @@ TEST(LoopCloserTest, WhatMoversHideIsNotMissed) {
   EXPECT_LT(visits.WorstCenter(), 0.02);
 }
 
+TEST(LoopCloserTest, OlderKeyframesDoNotLookForYoungerOnes) {
+  TwoVisits visits(kDrift);
+  LoopCloser closer(visits.world.camera(), {}, 1, &visits.map.shared_map);
+  EXPECT_THAT(closer.Process(visits.ids[0].back(), visits.map.map.epoch()).attempts, IsEmpty());
+}
+
+TEST(LoopCloserTest, PlacesThatLookLessAlikeThanNeighboursDoAreNotTried) {
+  TwoVisits visits(kDrift);
+  EXPECT_THAT(visits.Close({.min_score_ratio = 100}).attempts, IsEmpty());
+}
+
+TEST(LoopCloserTest, APlaceOfWhichMostIsKnownIsNoNews) {
+  SyntheticWorld world(1500);
+  SyntheticMap map(&world);
+  std::vector<KeyframeId> visits[2], all;
+  for (int i = 0; i < 12; ++i) {
+    all.push_back(map.Add(SidewaysPose(0.1 * (i % 6) + (i < 6 ? 0 : 0.05))));
+    visits[i / 6].push_back(all.back());
+  }
+  map.AddLandmarks(0, 900, all);
+  for (const auto& visit : visits) map.AddLandmarks(900, 1500, visit);
+  LoopCloser closer(world.camera(), {.min_score_ratio = 0, .covisible_weight = 100000}, 1, &map.shared_map);
+  const size_t landmarks = map.map.landmarks().size();
+  const LoopResult result = closer.Process(all.back(), map.map.epoch());
+  EXPECT_FALSE(result.linked);
+  EXPECT_THAT(result.attempts,
+              testing::Contains(Field(&LoopAttempt::reason, testing::HasSubstr("known already"))));
+  EXPECT_EQ(map.map.landmarks().size(), landmarks);
+}
+
+TEST(LoopCloserTest, AKeyframeThatCameMeanwhileMovesAlong) {
+  TwoVisits visits(kDrift);
+  const Rigid3 before = visits.map.map.keyframes().At(visits.ids[1].back()).cam_from_world();
+  KeyframeId younger;
+  const LoopResult result = visits.Close({}, [&] {
+    if (younger.IsValid()) return false;
+    younger = visits.map.Add(visits.truth.back());  // which shares no landmark yet
+    visits.map.map.keyframes().At(younger).set_cam_from_world(before);
+    return false;
+  });
+  ASSERT_TRUE(result.corrected);
+  ASSERT_TRUE(younger.IsValid());
+  const Keyframe& moved = visits.map.map.keyframes().At(younger);
+  EXPECT_LT((moved.CenterInWorld() - visits.truth.back().TargetOriginInSource()).norm(), 0.02);
+}
+
 TEST(LoopCloserTest, OneKeyframeAloneIsNotBelieved) {
   TwoVisits visits(kDrift);
   const LoopResult result = visits.Close({.min_confirming_inliers = 1000});

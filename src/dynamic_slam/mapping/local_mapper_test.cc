@@ -46,6 +46,27 @@ std::vector<LandmarkId> CreateLandmarks(TwoKeyframes* two, const MapperOptions& 
   return created;
 }
 
+// A keyframe whose keypoints each have a double, which `change` makes another.
+template <class Change>
+KeyframeId AddWithDoubles(const Rigid3& cam_from_world, const Change& change, SyntheticWorld* world,
+                          SyntheticMap* scene) {
+  SyntheticView view = world->See(cam_from_world);
+  FeatureSet& features = view.frame.features;
+  const size_t count = features.size();
+  for (size_t i = 0; i < count; ++i) {
+    Keypoint twin = features.keypoints[i];
+    change(&twin);
+    features.keypoints.push_back(twin);
+    features.descriptors.push_back(features.descriptors[i]);
+    view.points.push_back(view.points[i]);
+  }
+  view.frame.grid.Build(features, world->camera().IdealBounds());
+  view.frame.ClearLandmarks();
+  view.frame.static_probability.assign(features.size(), 1.0f);
+  scene->views.push_back(view);
+  return InsertKeyframe(scene->views.back().frame, &scene->map, PartId(0));
+}
+
 FusionCount FuseWithNeighbours(const Camera& camera, KeyframeId id, Map* map) {
   LandmarkFusion fusion(camera, map->octave_scales());
   FusionCount sum;
@@ -104,6 +125,74 @@ TEST(LandmarkFactoryTest, NothingIsMadeBehindTheCamera) {
   // As if the camera had gone the other way: all rays meet behind it.
   two.scene.map.keyframes().At(two.second).set_cam_from_world(SidewaysPose(-0.5));
   EXPECT_LE(CreateLandmarks(&two).size(), 2u);
+}
+
+TEST(LandmarkFactoryTest, NothingIsMadeOfWhatMoves) {
+  constexpr float kMoversFromPx = 300;
+  SyntheticWorld world(kPoints);
+  SyntheticMap scene(&world);
+  const KeyframeId first = scene.Add(Rigid3(), PartId(0), kMoversFromPx);
+  const KeyframeId second = scene.Add(SidewaysPose(0.5), PartId(0), kMoversFromPx);
+  scene.AddLandmarks(0, kPoints / 4, {first, second});
+  const auto proposals = LandmarkFactory(world.camera(), {}).Propose(scene.map, second, first);
+  EXPECT_GT(proposals.size(), 50u);
+  for (const LandmarkProposal& proposal : proposals) {
+    EXPECT_LT(scene.map.keyframes().At(first).keypoint(proposal.second_keypoint).x, kMoversFromPx);
+    EXPECT_LT(scene.map.keyframes().At(second).keypoint(proposal.first_keypoint).x, kMoversFromPx);
+  }
+}
+
+TEST(LandmarkFactoryTest, ACornerInTwoOctavesIsOneAndTwoThatLookTheSameAreNone) {
+  const auto propose = [](int octaves_up, float px_right) {
+    SyntheticWorld world(kPoints);
+    SyntheticMap scene(&world);
+    const auto change = [&](Keypoint* twin) {
+      twin->octave = std::min(twin->octave + octaves_up, SyntheticWorld::kOctaves - 1);
+      twin->x += px_right;
+    };
+    const KeyframeId first = AddWithDoubles(Rigid3(), change, &world, &scene);
+    const KeyframeId second = scene.Add(SidewaysPose(0.5));
+    scene.AddLandmarks(0, kPoints / 4, {first, second});
+    return LandmarkFactory(world.camera(), {}).Propose(scene.map, second, first).size();
+  };
+  EXPECT_GT(propose(1, 0), 150u) << "in the next octave, at the same place";
+  EXPECT_LT(propose(0, 40), 15u) << "elsewhere on the epipolar line";
+}
+
+TEST(LandmarkFactoryTest, OctavesMustTellTheDistancesThatTheRaysTell) {
+  const auto propose = [](int octaves_up) {
+    SyntheticWorld world(kPoints);
+    SyntheticMap scene(&world);
+    // The first camera is two behind the second: what it sees is smaller, in lower octaves.
+    const Rigid3 behind(Eigen::Quaterniond::Identity(), {-0.5, 0, 2});
+    const auto change = [&](Keypoint* twin) {
+      twin->octave = std::min(twin->octave + octaves_up, SyntheticWorld::kOctaves - 1);
+    };
+    SyntheticView view = world.See(behind);
+    for (Keypoint& keypoint : view.frame.features.keypoints) change(&keypoint);
+    view.frame.grid.Build(view.frame.features, world.camera().IdealBounds());
+    view.frame.static_probability.assign(view.frame.features.size(), 1.0f);
+    scene.views.push_back(view);
+    const KeyframeId first = InsertKeyframe(scene.views.back().frame, &scene.map, PartId(0));
+    const KeyframeId second = scene.Add(Rigid3());
+    scene.AddLandmarks(0, kPoints / 4, {first, second});
+    return LandmarkFactory(world.camera(), {}).Propose(scene.map, second, first).size();
+  };
+  const size_t as_they_are = propose(0);
+  EXPECT_GT(as_they_are, 100u);
+  EXPECT_LT(propose(4), as_they_are / 4);
+}
+
+TEST(LandmarkFactoryTest, AKeypointGetsOneLandmark) {
+  TwoKeyframes two(0.5);
+  const auto proposals =
+      LandmarkFactory(two.world.camera(), {}).Propose(two.scene.map, two.second, two.first);
+  ASSERT_GT(proposals.size(), 2u);
+  LandmarkProposal same_first = proposals[1], same_second = proposals[2];
+  same_first.first_keypoint = proposals[0].first_keypoint;
+  same_second.second_keypoint = proposals[0].second_keypoint;
+  EXPECT_EQ(LandmarkFactory::Add({proposals[0], same_first, same_second}, &two.scene.map).size(), 1u);
+  EXPECT_THAT(two.scene.map.Validate(), IsEmpty());
 }
 
 // Keyframes that go on with their back to where they go: the neighbour is ahead, and has passed the start of
@@ -257,6 +346,46 @@ TEST(LocalMapperTest, ARedundantKeyframeGoesAndItsFramesStay) {
     EXPECT_LT((pose.translation - scene.views[i].frame.cam_from_world.translation).norm(), 0.01) << i;
   }
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
+}
+
+TEST(LocalMapperTest, WhatWaitsToBeMappedIsNotCulled) {
+  SyntheticWorld world(400);
+  SyntheticMap scene(&world);
+  LocalMapper mapper(world.camera(), {}, &scene.shared_map);
+  std::vector<KeyframeId> ids;
+  for (int i = 0; i < 8; ++i) ids.push_back(scene.Add(SidewaysPose(0.05 * i)));
+  scene.AddLandmarks(0, 400, ids);
+  EXPECT_GE(mapper.Process(ids[2], 0).culled_keyframes, 1);
+  for (int i = 2; i < 8; ++i) EXPECT_TRUE(scene.map.keyframes().Contains(ids[i])) << i;
+}
+
+TEST(LocalMapperTest, TheOriginStaysThoughItIsRedundant) {
+  SyntheticWorld world(400);
+  SyntheticMap scene(&world);
+  LocalMapper mapper(world.camera(), {}, &scene.shared_map);
+  std::vector<KeyframeId> ids;
+  for (const double x : {0.0, 0.4, -0.4, 0.45, -0.45, 0.0}) ids.push_back(scene.Add(SidewaysPose(x)));
+  scene.AddLandmarks(0, 400, ids);
+  ASSERT_EQ(scene.map.keyframes().At(ids.back()).BestCovisible(1).front().id, ids.front()) << "asked first";
+  mapper.Process(ids.back(), 0);
+  EXPECT_TRUE(scene.map.keyframes().Contains(ids.front()));
+}
+
+TEST(LocalMapperTest, AKeyframeFromAfarIsNotRedundantByThoseThatAreNear) {
+  SyntheticWorld world(400);
+  const auto survives = [&](double z) {
+    SyntheticMap scene(&world);
+    LocalMapper mapper(world.camera(), {}, &scene.shared_map);
+    std::vector<KeyframeId> ids;
+    for (int i = 0; i < 6; ++i) {
+      ids.push_back(scene.Add(Rigid3(Eigen::Quaterniond::Identity(), {-0.02 * i, 0, i == 4 ? z : 0.0})));
+    }
+    scene.AddLandmarks(0, 400, ids);
+    mapper.Process(ids.back(), 0);
+    return scene.map.keyframes().Contains(ids[4]);
+  };
+  EXPECT_FALSE(survives(0));
+  EXPECT_TRUE(survives(5));
 }
 
 TEST(LocalMapperTest, ALandmarkThatTrackingDoesNotFindIsCulled) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -71,11 +72,22 @@ SlamSystem::~SlamSystem() { executor_->Cancel(); }
 FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask) {
   DS_TRACE("frame");
   DS_CHECK(!is_stopped_, "the system was stopped: Reset() first");
-  executor_->ThrowIfFailed();
+  ThrowIfFailed();
   const UrgentSection urgent(mode_ == RunMode::kRealtime);
-  FrameResult result;
   const auto start = std::chrono::steady_clock::now();
+  const cv::Mat merged_mask = preparer_.MergedMask(mask);
   preparer_.Prepare(image, &grey_);
+  try {
+    return ProcessPrepared(timestamp_s, image, merged_mask, start);
+  } catch (...) {
+    failure_ = std::current_exception();
+    throw;
+  }
+}
+
+FrameResult SlamSystem::ProcessPrepared(double timestamp_s, const cv::Mat& image, const cv::Mat& mask,
+                                        std::chrono::steady_clock::time_point start) {
+  FrameResult result;
   result.id = FrameId(frame_count_++);
   double asking_ms = 0;  // inline, the detector itself
   if (detection_.has_value() && detection_->Begin(result.id, timestamp_s)) {
@@ -85,7 +97,7 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
     detection_->Submit(result.id, timestamp_s, colour);
     asking_ms = MillisecondsSince(asked);
   }
-  tracker_.Extract(result.id, timestamp_s, grey_, preparer_.MergedMask(mask));
+  tracker_.Extract(result.id, timestamp_s, grey_, mask);
   if (detection_.has_value()) {
     result.objects =
         detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation(), tracker_.Motions());
@@ -108,6 +120,11 @@ FrameResult SlamSystem::Process(double timestamp_s, const cv::Mat& image, const 
   result.keyframes_waiting = executor_->Waiting(Lane::kMapping);
   TraceCounter("keyframes waiting", result.keyframes_waiting);
   return result;
+}
+
+void SlamSystem::ThrowIfFailed() const {
+  if (failure_ != nullptr) std::rethrow_exception(failure_);
+  executor_->ThrowIfFailed();
 }
 
 void SlamSystem::Remember(const FrameResult& result) {
@@ -187,6 +204,7 @@ void SlamSystem::DrainMapping() {
 BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   DS_TRACE("finish");
   if (is_stopped_) return {};
+  ThrowIfFailed();
   DrainMapping();
   const bool adjusts = options_.final_bundle && !options_.tracker.localise_only;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
@@ -261,6 +279,7 @@ void SlamSystem::Reset() {
   *loop_report_.Write() = LoopReport();
   mapped_.Write()->clear();
   frame_count_ = 0;
+  failure_ = nullptr;
   is_stopped_ = false;
 }
 

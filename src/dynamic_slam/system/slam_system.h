@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -55,8 +57,9 @@ struct LoopReport {
 
 // Dynamic-SLAM. All calls come from one thread; in realtime mode the stages beside tracking have their own.
 //
-// What a stage throws reaches the caller by the next call of Process or Finish. After that, and after Stop(),
-// the results so far can be read; Reset() makes the system as new.
+// What a stage throws, tracking or another, reaches the caller by this call or the next of Process or Finish,
+// and by those after it again. After that, and after Stop(), the results so far can be read; Reset() makes
+// the system as new.
 class SlamSystem {
  public:
   // raw_camera: of the images that Process takes. Throws InputError when it or an option is out of range.
@@ -135,6 +138,9 @@ class SlamSystem {
   };
 
   PartId OrMain(PartId part) const;
+  FrameResult ProcessPrepared(double timestamp_s, const cv::Mat& image, const cv::Mat& mask,
+                              std::chrono::steady_clock::time_point start);
+  void ThrowIfFailed() const;
   void Remember(const FrameResult& result);
   void Backfill(const std::function<bool()>& should_stop);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
@@ -157,7 +163,8 @@ class SlamSystem {
   std::vector<TrackedFrame> tracked_;     // in the order of time
   std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   uint32_t frame_count_ = 0;
-  cv::Mat grey_;  // the image in work
+  cv::Mat grey_;                // the image in work
+  std::exception_ptr failure_;  // of Process: what it left half done is not gone on with
   bool is_stopped_ = false;
   std::unique_ptr<Executor> executor_;  // last: its tasks use all the others
 };

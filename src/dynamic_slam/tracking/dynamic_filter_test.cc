@@ -1,5 +1,6 @@
 #include "dynamic_slam/tracking/dynamic_filter.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -305,6 +306,59 @@ TEST_F(DynamicFilterTest, EvidenceOfALandmarkGrowsWhereItFitsAndFallsWhereItDoes
   EXPECT_NEAR(TrustInMatch(0.5f, 0.0f), 0.5, 1e-6);
   EXPECT_NEAR(TrustInMatch(0.5f, 2.0f), 1 / (1 + std::exp(-2.0)), 1e-6);
   EXPECT_EQ(TrustInMatch(1.0f, -4.0f), 1);
+  // Nothing is surer than that no object was missed.
+  EXPECT_FLOAT_EQ(filter.Evidence(1.0f, true), filter.Evidence(0.95f, true));
+}
+
+TEST_F(DynamicFilterTest, AFrameTellsALittleAndNothingIsSurerThanThatNoObjectWasMissed) {
+  DynamicFilter filter = Make("weights");
+  Run(&filter);
+  const auto [least, most] =
+      std::minmax_element(frame_.motion_log_odds.begin(), frame_.motion_log_odds.end());
+  EXPECT_EQ(*least, -2);
+  EXPECT_GT(*most, 1);
+  EXPECT_LE(*most, 2);
+  EXPECT_NEAR(*std::max_element(frame_.static_probability.begin(), frame_.static_probability.end()), 0.95,
+              1e-6);
+}
+
+TEST_F(DynamicFilterTest, ACarIsNotTakenForOneThatDroveThereBefore) {
+  DynamicFilter filter = Make("weights");
+  const DynamicKeypoints first = Run(&filter, Car(200, 0), Car(200, kPersonPx));
+  for (int i = 0; i < 3; ++i) Run(&filter, Car(200, 0), Car(200, kPersonPx));
+  DynamicBox before = Car(200, 0), now = Car(200, kPersonPx);
+  before.track_id = now.track_id = 3;
+  const DynamicKeypoints other = Run(&filter, before, now);
+  EXPECT_EQ(other.kept, first.kept);
+  EXPECT_EQ(other.culled, first.culled);
+}
+
+TEST_F(DynamicFilterTest, InTwoBoxesItBelongsToOneOfThem) {
+  DynamicOptions options;
+  options.motion = false;
+  DynamicFilter filter(camera_, options, OctaveScales());
+  DynamicBox one = Car(200, 0), other = Car(200, 0);
+  one.probability = 0.6;
+  other.probability = 0.8;
+  other.track_id = 3;
+  flow_.Clear(frame_);
+  filter.Judge(std::vector{one, other}, flow_, last_, &frame_);
+  for (size_t i = 0; i < on_person_.size(); ++i) {
+    const Keypoint& keypoint = frame_.features.keypoints[i];
+    if (!one.box.Contains(keypoint.raw_x, keypoint.raw_y)) continue;
+    EXPECT_NEAR(frame_.static_probability[i], 1 - (1 - 0.2 * 0.2) * 0.7, 1e-6);
+  }
+}
+
+TEST_F(DynamicFilterTest, LimbsThatSwingAreThePersonsToo) {
+  for (size_t i = 0; i < on_person_.size(); ++i) {
+    Keypoint& keypoint = frame_.features.keypoints[i];
+    if (on_person_[i]) keypoint.raw_x = keypoint.x += (i / 30) % 2 == 0 ? 6 : 0;  // every other row
+  }
+  frame_.grid.Build(frame_.features, camera_.IdealBounds());
+  DynamicFilter filter = Make("weights");
+  Run(&filter);
+  EXPECT_LT(MeanInBox(true), 0.08);
 }
 
 }  // namespace
