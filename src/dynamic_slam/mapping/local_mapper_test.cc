@@ -107,6 +107,7 @@ TEST(LandmarkFactoryTest, NewLandmarksAreNearTheTruth) {
 TEST(LandmarkFactoryTest, WithoutParallaxThereAreNone) {
   TwoKeyframes two(0.07);  // 0.6 to 1.4 deg
   MapperOptions options;
+  options.min_baseline_ratio = 0.001;
   options.min_parallax_deg = 2;
   EXPECT_THAT(CreateLandmarks(&two, options), IsEmpty());
   options.min_parallax_deg = 0.1;
@@ -118,6 +119,19 @@ TEST(LandmarkFactoryTest, NeighboursAtTheSamePlaceAreLeftOut) {
   MapperOptions options;
   options.min_parallax_deg = 0;
   EXPECT_THAT(CreateLandmarks(&two, options), IsEmpty());
+}
+
+TEST(LandmarkFactoryTest, NeighboursThatShareLessAreAskedWhereTheOthersAreTooNear) {
+  SyntheticWorld world(kPoints);
+  SyntheticMap scene(&world);
+  const KeyframeId far = scene.Add(SidewaysPose(-0.5));
+  const KeyframeId near = scene.Add(SidewaysPose(0.02)), newest = scene.Add(Rigid3());
+  scene.AddLandmarks(0, kPoints / 2, {far, near, newest});
+  scene.AddLandmarks(kPoints / 2, kPoints, {near, newest});
+  MapperOptions options;
+  options.triangulation_neighbours = 1;
+  EXPECT_THAT(LandmarkFactory(world.camera(), options).Neighbours(scene.map, newest),
+              testing::ElementsAre(far));
 }
 
 TEST(LandmarkFactoryTest, NothingIsMadeBehindTheCamera) {
