@@ -81,8 +81,9 @@ class PythonTest(unittest.TestCase):
         _, results = self.assert_same_poses_as_the_program(walk, "tum_fr1", 120, "builtin")
         people = [o for result in results for o in result.objects if o.class_name == "person"]
         self.assertGreater(len(people), 10)
+        # Not each: who was taken for a chair before is believed to move only after some frames.
+        self.assertGreater(sum(person.is_dynamic for person in people), 0.8 * len(people))
         for person in people:
-            self.assertTrue(person.is_dynamic)
             self.assertGreater(person.width * person.height, 0)
             self.assertTrue(0 <= person.score <= 1)
 
