@@ -104,6 +104,12 @@ float DynamicFilter::Combine(float prior, float motion_log_odds) const {
   return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
 }
 
+void DynamicFilter::AddEvidence(float log_odds, size_t keypoint, Frame* frame) const {
+  float& odds = frame->motion_log_odds[keypoint];
+  odds = std::clamp(odds + log_odds, -kMaxStaticLogOdds, kMaxStaticLogOdds);
+  frame->static_probability[keypoint] = Combine(prior_[keypoint], odds);
+}
+
 DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
                                       const Frame& last, Frame* frame) {
   DS_TRACE("tracking/judge");
@@ -280,10 +286,7 @@ void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
   for (size_t i = 0; i < prior_.size(); ++i) is_doubted_[i] = prior_[i] < 1 - options_.missed_object;
   const std::span<const float> evidence = past_views_.Judge(*frame, is_doubted_, suspects_, nearest_depth);
   for (size_t i = 0; i < evidence.size(); ++i) {
-    if (evidence[i] == 0) continue;
-    float& odds = frame->motion_log_odds[i];
-    odds = std::clamp(odds + evidence[i], -kMaxStaticLogOdds, kMaxStaticLogOdds);
-    frame->static_probability[i] = Combine(prior_[i], odds);
+    if (evidence[i] != 0) AddEvidence(evidence[i], i, frame);
   }
   past_views_.Add(*frame);
 }
@@ -358,10 +361,7 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
       sum_density += density + mismatch;
     }
     const double evidence = objects == 0 ? 0 : std::log(rest_density * objects / sum_density);
-    float& odds = frame->motion_log_odds[i];
-    odds = std::clamp(odds + static_cast<float>(std::clamp(evidence, -kMostEvidence, kMostEvidence)),
-                      -kMaxStaticLogOdds, kMaxStaticLogOdds);
-    frame->static_probability[i] = Combine(prior_[i], odds);
+    AddEvidence(static_cast<float>(std::clamp(evidence, -kMostEvidence, kMostEvidence)), i, frame);
   }
 }
 

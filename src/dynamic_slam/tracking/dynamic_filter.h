@@ -87,6 +87,8 @@ class DynamicFilter {
 
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
+  // How the keypoint moved tells so much more of whether it is at rest.
+  void AddEvidence(float log_odds, size_t keypoint, Frame* frame) const;
   double AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const;
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.

@@ -7,6 +7,7 @@
 
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/map/static_evidence.h"
+#include "dynamic_slam/semantics/compensation_test_scene.h"
 
 namespace dynamic_slam {
 namespace {
@@ -104,17 +105,7 @@ class DynamicFilterTest : public ::testing::Test {
   static constexpr double kPersonPx = 8;
 
   Random random_{7};
-  static Camera MakeCamera() {
-    Camera camera;
-    camera.width = 640;
-    camera.height = 480;
-    camera.fx = camera.fy = 500;
-    camera.cx = 320;
-    camera.cy = 240;
-    return camera;
-  }
-
-  Camera camera_ = MakeCamera();
+  Camera camera_ = TestCamera();
   Frame last_, frame_;
   KeypointFlow flow_{camera_, OctaveScales()};
   std::vector<bool> on_person_;

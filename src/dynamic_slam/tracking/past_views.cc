@@ -56,8 +56,12 @@ std::optional<Eigen::Vector2d> ShiftHistory::Sum(size_t steps) const {
   return sum;
 }
 
-void PastViews::Add(const Frame& frame) {
+void PastViews::ForgetUnlessNext(const Frame& frame) {
   if (count_ > 0 && views_[count_ - 1].id.value() + 1 != frame.id.value()) Clear();
+}
+
+void PastViews::Add(const Frame& frame) {
+  ForgetUnlessNext(frame);
   size_t old = 0;
   while (old < count_ && views_[old].timestamp_s < frame.timestamp_s - kMaxAge_s) ++old;
   std::rotate(views_.begin(), views_.begin() + static_cast<std::ptrdiff_t>(old), views_.end());
@@ -86,7 +90,7 @@ std::span<const float> PastViews::Judge(const Frame& frame, std::span<const uint
                                         std::span<const Object> objects, double nearest_depth) {
   evidence_.assign(frame.features.size(), 0.0f);
   is_told_.assign(frame.features.size(), 0);
-  if (count_ > 0 && views_[count_ - 1].id.value() + 1 != frame.id.value()) Clear();
+  ForgetUnlessNext(frame);
   const View* before = nullptr;
   for (const double age_s : kAges_s) {
     const View* view = FromBefore(frame, age_s);

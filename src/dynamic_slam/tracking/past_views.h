@@ -72,6 +72,7 @@ class PastViews {
                 double radius_px) const;
   };
 
+  void ForgetUnlessNext(const Frame& frame);
   const View* FromBefore(const Frame& frame, double age_s) const;
   void Ask(const View& view, const Frame& frame, std::span<const uint8_t> is_asked,
            std::span<const Object> objects, double nearest_depth);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/random.h"
+#include "dynamic_slam/semantics/compensation_test_scene.h"
 
 namespace dynamic_slam {
 namespace {
@@ -66,17 +67,7 @@ class PastViewsTest : public ::testing::Test {
     return views_.Judge(last_, all, objects, 0.3 * kDepth);
   }
 
-  static Camera MakeCamera() {
-    Camera camera;
-    camera.width = 640;
-    camera.height = 480;
-    camera.fx = camera.fy = 500;
-    camera.cx = 320;
-    camera.cy = 240;
-    return camera;
-  }
-
-  Camera camera_ = MakeCamera();
+  Camera camera_ = TestCamera();
   Random random_{3};
   std::vector<Eigen::Vector2d> places_;
   std::vector<Descriptor> descriptors_;
