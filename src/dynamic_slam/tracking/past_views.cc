@@ -100,7 +100,7 @@ std::span<const float> PastViews::Judge(const Frame& frame, std::span<const uint
   }
   for (float& evidence : evidence_) evidence = std::clamp(evidence, -kMostEvidence, kMostEvidence);
   ShareWithNeighbours(frame, is_asked);
-  return shared_;
+  return evidence_;
 }
 
 void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_t> is_asked,
@@ -112,6 +112,8 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
   looks_.assign(n, 0);
   carriers_.assign(n, 0);
   std::array<int, kMaxObjects> at_rest{}, with_object{};
+  std::array<std::optional<Eigen::Vector2d>, kMaxObjects> shifts_px;
+  for (size_t k = 0; k < objects.size(); ++k) shifts_px[k] = objects[k].shifts->Sum(steps);
   for (size_t i = 0; i < n; ++i) {
     if (is_asked[i] == 0) continue;
     const Keypoint& keypoint = frame.features.keypoints[i];
@@ -133,9 +135,8 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
     for (size_t k = 0; k < objects.size(); ++k) {
       if (!objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y, objects[k].margin_px + outline_px))
         continue;
-      const std::optional<Eigen::Vector2d> shift_px = objects[k].shifts->Sum(steps);
-      const Eigen::Vector2d carried_px = px - shift_px.value_or(Eigen::Vector2d::Zero());
-      const double apart_px = shift_px ? DistanceToSegment(carried_px, far_px, near_px) : 0;
+      const Eigen::Vector2d carried_px = px - shifts_px[k].value_or(Eigen::Vector2d::Zero());
+      const double apart_px = shifts_px[k] ? DistanceToSegment(carried_px, far_px, near_px) : 0;
       // Nobody can tell who stands still, or is not known to move, from what is behind.
       if (apart_px < 2 * radius_px) {
         is_clear = false;
@@ -147,7 +148,8 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
       with_object[k] += distance <= kStrictDistance;
       with_any = std::min(with_any, distance);
     }
-    if (carriers_[i] == 0) continue;
+    // What was not found with an object and may belong to one who stands still tells nothing either way.
+    if (carriers_[i] == 0 || (!is_clear && with_any > kStrictDistance)) continue;
     const int distance = view.Nearest(descriptor, keypoint.octave, far_px, near_px, radius_px);
     if (distance <= kStrictDistance && is_clear) {
       for (size_t k = 0; k < objects.size(); ++k) at_rest[k] += static_cast<int>(carriers_[i] >> k & 1);
@@ -186,20 +188,25 @@ int PastViews::View::Nearest(const Descriptor& descriptor, int octave, const Eig
 }
 
 void PastViews::ShareWithNeighbours(const Frame& frame, std::span<const uint8_t> is_asked) {
-  shared_ = evidence_;
+  const size_t n = evidence_.size();
+  neighbours_sum_.assign(n, 0.0f);
+  neighbours_.assign(n, 0);
   const int octaves = static_cast<int>(octave_scales_.size());
-  for (size_t i = 0; i < shared_.size(); ++i) {
-    if (is_asked[i] == 0) continue;
+  // From those that know to those around them, as few know.
+  for (uint32_t i = 0; i < n; ++i) {
+    if (is_told_[i] == 0) continue;
     const Keypoint& keypoint = frame.features.keypoints[i];
-    float sum = 0;
-    int told = 0;
     frame.grid.ForEachInWindow(keypoint.x, keypoint.y, kNeighbourRadius_px, 0, octaves, [&](uint32_t j) {
-      if (j == i || is_told_[j] == 0) return;
-      sum += evidence_[j];
-      ++told;
+      if (j == i) return;
+      neighbours_sum_[j] += evidence_[i];
+      ++neighbours_[j];
     });
+  }
+  for (size_t i = 0; i < n; ++i) {
+    if (is_asked[i] == 0) continue;
     // Their mean, the less the fewer they are.
-    shared_[i] = std::clamp(evidence_[i] + sum / static_cast<float>(told + 1), -kMostEvidence, kMostEvidence);
+    const float mean = neighbours_sum_[i] / static_cast<float>(neighbours_[i] + 1);
+    evidence_[i] = std::clamp(evidence_[i] + mean, -kMostEvidence, kMostEvidence);
   }
 }
 

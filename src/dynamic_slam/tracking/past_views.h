@@ -84,7 +84,8 @@ class PastViews {
   size_t count_ = 0;
 
   // Of each keypoint.
-  std::vector<float> evidence_, shared_;
+  std::vector<float> evidence_, neighbours_sum_;
+  std::vector<int> neighbours_;  // that know something
   std::vector<uint8_t> is_told_;
   std::vector<int8_t> looks_;       // in the view in hand: 1 at rest, -1 with an object, 0 neither
   std::vector<uint64_t> carriers_;  // bits: the objects whose boxes it is in
