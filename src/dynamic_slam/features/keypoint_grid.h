@@ -24,9 +24,11 @@ class KeypointGrid {
 
   // Calls fn(uint32_t index) for each keypoint at a distance <= radius_px from the ideal pixel (x, y) and of
   // an octave from min_octave to max_octave, and for no other, cell by cell (row-major), in a cell by index.
-  // An empty grid, a negative radius or a NaN finds nothing.
+  // An empty grid, a negative radius or a NaN finds nothing. Always inlined: a function of its own would be
+  // compiled for the plain processor only, and what fn does with it (base/dispatch.h).
   template <class Fn>
-  void ForEachInWindow(float x, float y, float radius_px, int min_octave, int max_octave, Fn&& fn) const {
+  __attribute__((always_inline)) void ForEachInWindow(float x, float y, float radius_px, int min_octave,
+                                                      int max_octave, Fn&& fn) const {
     if (entries_.empty() || !(radius_px >= 0) || x != x || y != y || min_octave > max_octave) return;
     const int first_column = Column(x - radius_px), last_column = Column(x + radius_px);
     const int first_row = Row(y - radius_px), last_row = Row(y + radius_px);

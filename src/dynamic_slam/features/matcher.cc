@@ -46,7 +46,6 @@ WindowMatch FindInWindow(const FeatureSet& features, const KeypointGrid& grid, c
                          const Descriptor& descriptor, std::span<const uint8_t> taken) {
   WindowMatch best;
   uint32_t second = 0;
-  // Inlined, as a function of its own would be compiled for the plain processor only.
   const auto visit = [&](uint32_t index) __attribute__((always_inline)) {
     if (!taken.empty() && taken[index] != 0) return;
     const int distance = HammingDistance(descriptor, features.descriptors[index]);
