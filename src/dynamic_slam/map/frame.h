@@ -15,9 +15,10 @@ struct Frame {
   double timestamp_s = 0;
   FeatureSet features;
   KeypointGrid grid;
-  std::vector<LandmarkId> landmarks;    // of each keypoint; not valid where there is none
-  std::vector<Eigen::Vector3d> points;  // where that landmark was in the world when it was matched
-  std::vector<float> static_log_odds;   // of that landmark, when it was matched
+  std::vector<LandmarkId> landmarks;     // of each keypoint; not valid where there is none
+  std::vector<Eigen::Vector3d> points;   // where that landmark was in the world when it was matched
+  std::vector<Eigen::Vector3f> spreads;  // of that landmark (Landmark::spread), when it was matched
+  std::vector<float> static_log_odds;    // of that landmark, when it was matched
   // P(at rest) of what each keypoint shows, before anything is known of its landmark; 0: not to be used.
   std::vector<float> static_probability;
   // Log of P(at rest) / P(moves) by how each keypoint moved since it was first seen (DynamicFilter).
@@ -40,6 +41,7 @@ struct Frame {
   void ClearLandmarks() {
     landmarks.assign(features.size(), LandmarkId());
     points.resize(features.size());
+    spreads.assign(features.size(), Eigen::Vector3f::Zero());
     static_log_odds.assign(features.size(), 0.0f);
   }
 };

@@ -41,6 +41,9 @@ class Landmark {
   // From max_distance it shows in octave 0, from nearer in coarser octaves, from min_distance in the last.
   float min_distance() const { return min_distance_; }
   float max_distance() const { return max_distance_; }
+  // How far it may be off along the normal: one standard deviation in world, for keypoints of octave 0 that
+  // are off by one focal length. Times the sigma of a keypoint over the focal length it is a length.
+  const Eigen::Vector3f& spread() const { return spread_; }
   const Descriptor& descriptor() const { return descriptor_; }  // the observation's nearest to all others
 
   // How often tracking expected to see it, and found it.
@@ -61,6 +64,7 @@ class Landmark {
   std::vector<Observation> observations_;
   Eigen::Vector3f normal_ = Eigen::Vector3f::Zero();
   float min_distance_ = 0, max_distance_ = 0;
+  Eigen::Vector3f spread_ = Eigen::Vector3f::Zero();
   Descriptor descriptor_{};
 };
 

@@ -27,6 +27,7 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
   view->ids.clear();
   view->positions.clear();
   view->normals.clear();
+  view->spreads.clear();
   view->min_distances.clear();
   view->max_distances.clear();
   view->descriptors.clear();
@@ -87,6 +88,7 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     const Landmark& landmark = *landmarks_[i];
     view->positions.push_back(landmark.position());
     view->normals.push_back(landmark.normal());
+    view->spreads.push_back(landmark.spread());
     view->min_distances.push_back(landmark.min_distance());
     view->max_distances.push_back(landmark.max_distance());
     view->descriptors.push_back(landmark.descriptor());

@@ -16,7 +16,7 @@ namespace dynamic_slam {
 struct LocalView {
   std::vector<LandmarkId> ids;
   std::vector<Eigen::Vector3d> positions;  // in world
-  std::vector<Eigen::Vector3f> normals;
+  std::vector<Eigen::Vector3f> normals, spreads;
   std::vector<float> min_distances, max_distances;
   std::vector<Descriptor> descriptors;
   std::vector<float> static_log_odds;

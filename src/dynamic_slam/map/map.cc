@@ -69,6 +69,7 @@ void Landmark::Transform(const Sim3& new_from_old) {
   normal_ = new_from_old.rotation.cast<float>() * normal_;
   min_distance_ *= static_cast<float>(new_from_old.scale);
   max_distance_ *= static_cast<float>(new_from_old.scale);
+  spread_ = static_cast<float>(new_from_old.scale) * (new_from_old.rotation.cast<float>() * spread_);
 }
 
 void Map::Reset() { Replace(Map(octave_scales_)); }
@@ -291,6 +292,18 @@ void Map::RefreshLandmark(LandmarkId id) {
   landmark.normal_ = normal.normalized().cast<float>();
   landmark.max_distance_ = static_cast<float>(std::exp(log_distance_sum / static_cast<double>(count)));
   landmark.min_distance_ = landmark.max_distance_ / octave_scales_.back();
+
+  // An observation tells of a move along the normal what it sees from aside.
+  double information = 0;
+  const Eigen::Vector3d mean = landmark.normal_.cast<double>();
+  for (const Observation& observation : landmark.observations_) {
+    const Keyframe& keyframe = keyframes_.At(observation.keyframe);
+    const Eigen::Vector3d direction = landmark.position_ - keyframe.CenterInWorld();
+    const double scale = octave_scales_[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];
+    information +=
+        direction.cross(mean).squaredNorm() / std::max(std::pow(direction.squaredNorm() * scale, 2), 1e-24);
+  }
+  landmark.spread_ = landmark.normal_ / static_cast<float>(std::sqrt(std::max(information, 1e-24)));
 
   landmark.descriptor_ = *descriptors[count > 2 ? Medoid(descriptors) : count - 1];
 }

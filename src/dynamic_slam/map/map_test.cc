@@ -199,6 +199,34 @@ TEST(MapTest, ADistanceTellsTheOctave) {
   EXPECT_NEAR(landmark.normal().z(), 1, 1e-6);
 }
 
+// Two cameras beside each other see it from the sides: by how much its image moves when it moves along the
+// normal.
+TEST(MapTest, TheSpreadIsHowFarItCanBeOffUnseen) {
+  Map map = MakeMap();
+  const auto at = [](double x) { return Rigid3(Eigen::Quaterniond::Identity(), {-x, 0, 0}); };
+  const KeyframeId a = AddKeyframe(&map, 10, at(-0.1)), b = AddKeyframe(&map, 10, at(0.1));
+  const LandmarkId id = AddLandmark(&map, {{a, 0}, {b, 1}});
+  map.RefreshLandmark(id);
+  Landmark& landmark = map.landmarks().At(id);
+  double information = 0;
+  for (const Observation& observation : landmark.observations()) {
+    const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
+    const auto image = [&](double z) {
+      return (keyframe.cam_from_world() * Eigen::Vector3d(0, 0, z)).hnormalized();
+    };
+    const double scale =
+        map.octave_scales()[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];
+    information += ((image(2.001) - image(1.999)) / (0.002 * scale)).squaredNorm();
+  }
+  const double expected = 1 / std::sqrt(information);
+  EXPECT_NEAR(landmark.spread().norm(), expected, 0.01 * expected);
+  EXPECT_NEAR(landmark.spread().z(), landmark.spread().norm(), 1e-3 * expected);
+  landmark.Transform(
+      Sim3(3, Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX())), {1, 2, 3}));
+  EXPECT_NEAR(landmark.spread().norm(), 3 * expected, 0.03 * expected);
+  EXPECT_NEAR(landmark.spread().normalized().dot(landmark.normal()), 1, 1e-6);
+}
+
 TEST(LocalViewTest, HoldsWhatTheNeighboursSeeOnce) {
   Map map = MakeMap();
   const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10);

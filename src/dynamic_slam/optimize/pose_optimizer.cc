@@ -50,10 +50,13 @@ void Accumulate(const PoseObservations& o, const Rigid3& cam_from_world, double 
   const Lanes zero = {}, one = zero + 1.0, min_depth = zero + kMinDepth, min_error = zero + 1e-300;
 
   for (size_t begin = 0; begin < o.size(); begin += kLanes) {
-    Lanes wx, wy, wz, u, v, inverse_sigma, weight;
+    Lanes wx, wy, wz, px, py, pz, u, v, inverse_sigma, weight;
     Load(o.x, begin, &wx);
     Load(o.y, begin, &wy);
     Load(o.z, begin, &wz);
+    Load(o.spread_x, begin, &px);
+    Load(o.spread_y, begin, &py);
+    Load(o.spread_z, begin, &pz);
     Load(o.u, begin, &u);
     Load(o.v, begin, &v);
     Load(o.inverse_sigma_px, begin, &inverse_sigma);
@@ -65,11 +68,28 @@ void Accumulate(const PoseObservations& o, const Rigid3& cam_from_world, double 
     const Lanes inverse_z = one / (in_front ? z : one);
     const Lanes a = x * inverse_z, b = y * inverse_z;
     const Lanes su = fx * inverse_sigma, sv = fy * inverse_sigma;
-    const Lanes ru = su * a + (cx - u) * inverse_sigma;
-    const Lanes rv = sv * b + (cy - v) * inverse_sigma;
-    // d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
-    const Lanes ju[6] = {-su * a * b, su * (1.0 + a * a), -su * b, su * inverse_z, zero, -su * a * inverse_z};
-    const Lanes jv[6] = {-sv * (1.0 + b * b), sv * a * b, sv * a, zero, sv * inverse_z, -sv * b * inverse_z};
+    // The image e of the spread, in sigmas. The residual's covariance is I + e e^T, whose inverse root is
+    // I - c e e^T with c = 1 / (k + k^2) and k^2 = 1 + |e|^2.
+    const Lanes dx = R(0, 0) * px + R(0, 1) * py + R(0, 2) * pz;
+    const Lanes dy = R(1, 0) * px + R(1, 1) * py + R(1, 2) * pz;
+    const Lanes dz = R(2, 0) * px + R(2, 1) * py + R(2, 2) * pz;
+    const Lanes eu = su * (dx - a * dz) * inverse_z, ev = sv * (dy - b * dz) * inverse_z;
+    const Lanes k_squared = one + eu * eu + ev * ev;
+    Lanes k = k_squared;
+    for (int i = 0; i < kLanes; ++i) k[i] = std::sqrt(k[i]);
+    const Lanes c = one / (k + k_squared);
+    const Lanes uu = one - c * eu * eu, uv = zero - c * eu * ev, vv = one - c * ev * ev;
+    const Lanes raw_ru = su * a + (cx - u) * inverse_sigma, raw_rv = sv * b + (cy - v) * inverse_sigma;
+    const Lanes ru = uu * raw_ru + uv * raw_rv, rv = uv * raw_ru + vv * raw_rv;
+    // Whitened d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
+    Lanes ju[6] = {-su * a * b, su * (1.0 + a * a), -su * b, su * inverse_z, zero, -su * a * inverse_z};
+    Lanes jv[6] = {-sv * (1.0 + b * b), sv * a * b, sv * a, zero, sv * inverse_z, -sv * b * inverse_z};
+#pragma GCC unroll 6
+    for (int i = 0; i < 6; ++i) {
+      const Lanes raw_ju = ju[i];
+      ju[i] = uu * raw_ju + uv * jv[i];
+      jv[i] = uv * raw_ju + vv * jv[i];
+    }
     // A point that a step takes behind the camera has no derivative; it counts as one focal length of
     // error, so that leaving the view is no way to lower the cost.
     const Lanes e2 = in_front ? ru * ru + rv * rv : su * su;
@@ -114,7 +134,8 @@ bool SolveStep(const NormalEquations& normal, double damping, Vector6* step) {
 }
 
 bool IsUsable(const PoseObservations& o, size_t i) {
-  const double sum = o.x[i] + o.y[i] + o.z[i] + o.u[i] + o.v[i];
+  const double sum =
+      o.x[i] + o.y[i] + o.z[i] + o.spread_x[i] + o.spread_y[i] + o.spread_z[i] + o.u[i] + o.v[i];
   return std::isfinite(sum) && o.weight[i] > 0 && std::isfinite(o.weight[i]) && o.inverse_sigma_px[i] > 0 &&
          std::isfinite(o.inverse_sigma_px[i]);
 }
@@ -122,11 +143,16 @@ bool IsUsable(const PoseObservations& o, size_t i) {
 }  // namespace
 
 void PoseObservations::Clear() {
-  for (std::vector<double>* array : {&x, &y, &z, &u, &v, &inverse_sigma_px, &weight}) array->clear();
+  for (std::vector<double>* array :
+       {&x, &y, &z, &spread_x, &spread_y, &spread_z, &u, &v, &inverse_sigma_px, &weight})
+    array->clear();
 }
 
 void PoseObservations::Add(const Eigen::Vector3d& x_in_world, const Eigen::Vector2d& ideal_px,
-                           double inverse_sigma, double trust) {
+                           double inverse_sigma, double trust, const Eigen::Vector3d& spread_in_world) {
+  spread_x.push_back(spread_in_world.x());
+  spread_y.push_back(spread_in_world.y());
+  spread_z.push_back(spread_in_world.z());
   x.push_back(x_in_world.x());
   y.push_back(x_in_world.y());
   z.push_back(x_in_world.z());
@@ -189,7 +215,7 @@ int PoseOptimizer::Activate(const PoseObservations& all, const std::vector<uint8
   for (size_t i = 0; i < all.size(); ++i) {
     if (is_inlier[i]) {
       active_.Add({all.x[i], all.y[i], all.z[i]}, {all.u[i], all.v[i]}, all.inverse_sigma_px[i],
-                  all.weight[i]);
+                  all.weight[i], {all.spread_x[i], all.spread_y[i], all.spread_z[i]});
     }
   }
   const int count = static_cast<int>(active_.size());

@@ -15,14 +15,16 @@ namespace dynamic_slam {
 // Matches between points of the map and keypoints of one frame, as arrays so that the inner loop runs on
 // consecutive numbers. Keep one object and Clear() it between frames: nothing is allocated after the first.
 struct PoseObservations {
-  std::vector<double> x, y, z;           // point in world
+  std::vector<double> x, y, z;  // point in world
+  // How far the point may be off along a line: one standard deviation, in world.
+  std::vector<double> spread_x, spread_y, spread_z;
   std::vector<double> u, v;              // ideal px
   std::vector<double> inverse_sigma_px;  // 1 / (standard deviation of the keypoint: the scale of its octave)
   std::vector<double> weight;            // trust in the match: 1 is certain, 0 is not used
 
   void Clear();
   void Add(const Eigen::Vector3d& x_in_world, const Eigen::Vector2d& ideal_px, double inverse_sigma,
-           double trust = 1.0);
+           double trust = 1.0, const Eigen::Vector3d& spread_in_world = Eigen::Vector3d::Zero());
   size_t size() const { return x.size(); }
 };
 
@@ -60,6 +62,11 @@ struct PoseEstimate {
 
 // Finds the camera pose that minimises the reprojection error of known points: Eq. (10) of the paper, with
 // a Huber kernel, per-octave sigmas, weights, and outliers that are named anew after each round.
+//
+// Where a point was triangulated from views that lie close together, its depth is uncertain, and taking it
+// for certain shortens the camera's motion (errors in variables): the scale of the map would shrink with each
+// generation of points. So an error counts the less the more of it the point's spread can explain. Outliers
+// are named without that, as wrong matches lie on the same line.
 class PoseOptimizer {
  public:
   explicit PoseOptimizer(const Camera& camera, const PoseOptimizerOptions& options = {});

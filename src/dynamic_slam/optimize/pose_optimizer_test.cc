@@ -93,6 +93,37 @@ TEST(PoseOptimizer, InformationEqualsThatOfNumericDifferences) {
   EXPECT_LT((estimate.information - numeric).norm(), 1e-5 * numeric.norm());
 }
 
+// Points that were placed with wrong depths, along the rays of the camera at the origin that saw them; the
+// camera has moved to the side since. What is taken for certain shortens the motion, as a rotation explains
+// the rest.
+TEST(PoseOptimizer, UncertainDepthsDoNotShortenTheMotion) {
+  const Camera camera = SyntheticCamera();
+  const Rigid3 truth(Eigen::Quaterniond::Identity(), {-0.3, 0, 0});
+  constexpr double kDepthError = 0.15;  // over the depth
+  PoseOptimizerOptions options;
+  options.chi2 = 1e4;  // every point stays
+  double certain = 0, uncertain = 0;
+  const int trials = 100;
+  for (uint64_t seed = 0; seed < trials; ++seed) {
+    Random random(seed);
+    PoseObservations with, without;
+    for (int i = 0; i < 150; ++i) {
+      const Eigen::Vector3d ray =
+          camera.Unproject({random.Uniform(0, camera.width), random.Uniform(0, camera.height)});
+      const double depth = random.Uniform(3, 6);
+      Eigen::Vector2d px = camera.Project(truth * (depth * ray));
+      px += 0.5 * Eigen::Vector2d(random.Gaussian(), random.Gaussian());
+      const Eigen::Vector3d point = depth * (1 + kDepthError * random.Gaussian()) * ray;
+      with.Add(point, px, 1.0, 1.0, depth * kDepthError * ray);
+      without.Add(point, px, 1.0);
+    }
+    uncertain += Optimize(with, Rigid3(), options).cam_from_world.translation.norm() / trials;
+    certain += Optimize(without, Rigid3(), options).cam_from_world.translation.norm() / trials;
+  }
+  EXPECT_LT(certain, 0.8 * 0.3);
+  EXPECT_NEAR(uncertain, 0.3, 0.05 * 0.3);
+}
+
 TEST(PoseOptimizer, FindsThePoseAmongOutliers) {
   for (const int outliers : {80, 100}) {
     for (uint64_t seed = 0; seed < 50; ++seed) {

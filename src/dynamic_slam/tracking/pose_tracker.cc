@@ -54,7 +54,8 @@ int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_f
         FindInWindow(frame->features, frame->grid, window, last.features.descriptors[i], taken_);
     if (!match.Found() || match.distance > MaxDistance(*frame, match.keypoint)) continue;
     taken_[match.keypoint] = 1;
-    candidates_.push_back({match.keypoint, last.landmarks[i], last.points[i], last.static_log_odds[i]});
+    candidates_.push_back(
+        {match.keypoint, last.landmarks[i], last.points[i], last.spreads[i], last.static_log_odds[i]});
     rotation_.Add(last_keypoint.angle_rad, frame->features.keypoints[match.keypoint].angle_rad);
   }
   AcceptCandidates(frame);
@@ -78,7 +79,7 @@ int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Ran
   for (const Match& match : matches) {
     const LandmarkId landmark = keyframe.landmarks()[match.first];
     const Landmark& known = map.landmarks().At(landmark);
-    candidates_.push_back({match.second, landmark, known.position(), known.static_log_odds});
+    candidates_.push_back({match.second, landmark, known.position(), known.spread(), known.static_log_odds});
     rotation_.Add(keyframe.keypoint(match.first).angle_rad,
                   frame->features.keypoints[match.second].angle_rad);
   }
@@ -142,6 +143,7 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
     taken_[match.keypoint] = 1;
     frame->landmarks[match.keypoint] = view.ids[i];
     frame->points[match.keypoint] = view.positions[i];
+    frame->spreads[match.keypoint] = view.spreads[i];
     frame->static_log_odds[match.keypoint] = view.static_log_odds[i];
   }
   return OptimisePose(frame->cam_from_world, frame);
@@ -154,7 +156,8 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     if (!frame->landmarks[i].IsValid()) continue;
     const Keypoint& keypoint = frame->features.keypoints[i];
     observations_.Add(frame->points[i], {keypoint.x, keypoint.y},
-                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)], TrustIn(*frame, i));
+                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)], TrustIn(*frame, i),
+                      frame->spreads[i].cast<double>() / camera_.fx);
     observed_keypoints_.push_back(i);
   }
   rejected_.clear();
@@ -184,6 +187,7 @@ void PoseTracker::AcceptCandidates(Frame* frame) {
     if (keep[i] == 0) continue;
     frame->landmarks[candidates_[i].keypoint] = candidates_[i].landmark;
     frame->points[candidates_[i].keypoint] = candidates_[i].point;
+    frame->spreads[candidates_[i].keypoint] = candidates_[i].spread;
     frame->static_log_odds[candidates_[i].keypoint] = candidates_[i].static_log_odds;
   }
 }

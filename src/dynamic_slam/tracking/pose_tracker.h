@@ -45,6 +45,7 @@ class PoseTracker {
     uint32_t keypoint;
     LandmarkId landmark;
     Eigen::Vector3d point;
+    Eigen::Vector3f spread;
     float static_log_odds;
   };
   void AcceptCandidates(Frame* frame);

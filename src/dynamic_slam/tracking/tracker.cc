@@ -266,6 +266,7 @@ void Tracker::RefreshLastFrame() {
     if (!last_.landmarks[i].IsValid()) continue;
     const Landmark& landmark = map->landmarks().At(last_.landmarks[i]);
     last_.points[i] = landmark.position();
+    last_.spreads[i] = landmark.spread();
     last_.static_log_odds[i] = landmark.static_log_odds;
   }
 }
