@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "dynamic_slam/features/features.h"
 
 namespace dynamic_slam {
@@ -29,10 +31,53 @@ class KeypointGrid {
   template <class Fn>
   __attribute__((always_inline)) void ForEachInWindow(float x, float y, float radius_px, int min_octave,
                                                       int max_octave, Fn&& fn) const {
-    if (entries_.empty() || !(radius_px >= 0) || x != x || y != y || min_octave > max_octave) return;
-    const int first_column = Column(x - radius_px), last_column = Column(x + radius_px);
-    const int first_row = Row(y - radius_px), last_row = Row(y + radius_px);
     const float radius_squared = radius_px * radius_px;
+    ForEachInRectangle(
+        x - radius_px, y - radius_px, x + radius_px, y + radius_px,
+        [&](const Entry& entry) __attribute__((always_inline)) {
+          const float dx = entry.x - x, dy = entry.y - y;
+          return (dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
+                 (entry.octave <= max_octave);
+        },
+        fn);
+  }
+
+  // The same for those at a distance <= radius_px from the line between two ideal pixels.
+  template <class Fn>
+  __attribute__((always_inline)) void ForEachAlong(const Eigen::Vector2f& a, const Eigen::Vector2f& b,
+                                                   float radius_px, int min_octave, int max_octave,
+                                                   Fn&& fn) const {
+    const float radius_squared = radius_px * radius_px;
+    const Eigen::Vector2f along = b - a;
+    const float length_squared = along.squaredNorm();
+    const float over = length_squared > 0 ? 1 / length_squared : 0;
+    ForEachInRectangle(
+        std::min(a.x(), b.x()) - radius_px, std::min(a.y(), b.y()) - radius_px,
+        std::max(a.x(), b.x()) + radius_px, std::max(a.y(), b.y()) + radius_px,
+        [&](const Entry& entry) __attribute__((always_inline)) {
+          const float dx = entry.x - a.x(), dy = entry.y - a.y();
+          const float t = std::min(std::max((dx * along.x() + dy * along.y()) * over, 0.0f), 1.0f);
+          const float off_x = dx - t * along.x(), off_y = dy - t * along.y();
+          return (off_x * off_x + off_y * off_y <= radius_squared) & (entry.octave >= min_octave) &
+                 (entry.octave <= max_octave);
+        },
+        fn);
+  }
+
+ private:
+  struct Entry {
+    float x, y;  // ideal px; copied here so that a query reads one array only
+    uint32_t index;
+    int octave;
+  };
+
+  // Of the keypoints in the cells that touch the rectangle, those of which is_inside(entry) tells 1.
+  template <class IsInside, class Fn>
+  __attribute__((always_inline)) void ForEachInRectangle(float min_x, float min_y, float max_x, float max_y,
+                                                         IsInside&& is_inside, Fn&& fn) const {
+    if (entries_.empty() || !(min_x <= max_x) || !(min_y <= max_y)) return;
+    const int first_column = Column(min_x), last_column = Column(max_x);
+    const int first_row = Row(min_y), last_row = Row(max_y);
     // Where keypoints are is hard to predict, so they are first found without a branch, then visited.
     constexpr size_t kMost = 128;
     uint32_t found[kMost];
@@ -43,10 +88,8 @@ class KeypointGrid {
       const uint32_t end = cell_begin_[row * columns_ + last_column + 1];
       for (uint32_t i = begin; i < end; ++i) {
         const Entry& entry = entries_[i];
-        const float dx = entry.x - x, dy = entry.y - y;
         found[count] = entry.index;
-        count += static_cast<size_t>((dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
-                                     (entry.octave <= max_octave));
+        count += static_cast<size_t>(is_inside(entry));
         if (count == kMost) {
           for (const uint32_t index : found) fn(index);
           count = 0;
@@ -55,13 +98,6 @@ class KeypointGrid {
     }
     for (size_t i = 0; i < count; ++i) fn(found[i]);
   }
-
- private:
-  struct Entry {
-    float x, y;  // ideal px; copied here so that a query reads one array only
-    uint32_t index;
-    int octave;
-  };
 
   // Clamped before the conversion: far outside, the float does not fit an int.
   int Column(float x) const { return Cell((x - min_x_) * (1 / kCellSizePx), columns_); }

@@ -7,6 +7,7 @@
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/random.h"
+#include "dynamic_slam/geometry/segment.h"
 
 namespace dynamic_slam {
 namespace {
@@ -60,6 +61,38 @@ TEST(KeypointGrid, FindsExactlyWhatBruteForceFinds) {
     EXPECT_THAT(Query(grid, x, y, radius_px, min_octave, max_octave),
                 testing::UnorderedElementsAreArray(expected));
     total += expected.size();
+  }
+  EXPECT_GT(total, 1000u);
+}
+
+TEST(KeypointGrid, FindsWhatLiesAlongALine) {
+  const FeatureSet features = RandomFeatures(1500, 5);
+  KeypointGrid grid;
+  grid.Build(features, kBounds);
+  Random random(6);
+  const auto point = [&random] {
+    return Eigen::Vector2f(static_cast<float>(random.Uniform(-60, 700)),
+                           static_cast<float>(random.Uniform(-60, 540)));
+  };
+  size_t total = 0;
+  for (int query = 0; query < 500; ++query) {
+    const Eigen::Vector2f a = point(), b = query % 10 == 0 ? a : point();
+    const float radius_px = static_cast<float>(random.Uniform(0, 40));
+    std::vector<uint32_t> found, near, beyond;
+    grid.ForEachAlong(a, b, radius_px, 1, 2, [&](uint32_t index) { found.push_back(index); });
+    for (uint32_t i = 0; i < features.size(); ++i) {
+      const Keypoint& keypoint = features.keypoints[i];
+      const double distance = DistanceToSegment({keypoint.x, keypoint.y}, a.cast<double>(), b.cast<double>());
+      // Numbers of less precision may tell otherwise what lies just on the border.
+      if (keypoint.octave < 1 || keypoint.octave > 2 || distance > radius_px + 1e-3) {
+        beyond.push_back(i);
+      } else if (distance < radius_px - 1e-3) {
+        near.push_back(i);
+      }
+    }
+    EXPECT_THAT(found, testing::IsSupersetOf(near));
+    for (const uint32_t i : beyond) EXPECT_THAT(found, testing::Not(testing::Contains(i)));
+    total += near.size();
   }
   EXPECT_GT(total, 1000u);
 }

@@ -212,7 +212,8 @@ TEST(MapTest, TheSpreadIsHowFarItCanBeOffUnseen) {
   for (const Observation& observation : landmark.observations()) {
     const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
     const auto image = [&](double z) {
-      return (keyframe.cam_from_world() * Eigen::Vector3d(0, 0, z)).hnormalized();
+      const Eigen::Vector3d x_in_cam = keyframe.cam_from_world() * Eigen::Vector3d(0, 0, z);
+      return Eigen::Vector2d(x_in_cam.head<2>() / x_in_cam.z());
     };
     const double scale =
         map.octave_scales()[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];

@@ -68,31 +68,22 @@ void Accumulate(const PoseObservations& o, const Rigid3& cam_from_world, double 
     const Lanes inverse_z = one / (in_front ? z : one);
     const Lanes a = x * inverse_z, b = y * inverse_z;
     const Lanes su = fx * inverse_sigma, sv = fy * inverse_sigma;
-    // The image e of the spread, in sigmas. The residual's covariance is I + e e^T, whose inverse root is
-    // I - c e e^T with c = 1 / (k + k^2) and k^2 = 1 + |e|^2.
+    const Lanes ru = su * a + (cx - u) * inverse_sigma;
+    const Lanes rv = sv * b + (cy - v) * inverse_sigma;
+    // d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
+    const Lanes ju[6] = {-su * a * b, su * (1.0 + a * a), -su * b, su * inverse_z, zero, -su * a * inverse_z};
+    const Lanes jv[6] = {-sv * (1.0 + b * b), sv * a * b, sv * a, zero, sv * inverse_z, -sv * b * inverse_z};
+    // With the image e of the spread the residual's covariance is I + e e^T, in sigmas, and its inverse this.
     const Lanes dx = R(0, 0) * px + R(0, 1) * py + R(0, 2) * pz;
     const Lanes dy = R(1, 0) * px + R(1, 1) * py + R(1, 2) * pz;
     const Lanes dz = R(2, 0) * px + R(2, 1) * py + R(2, 2) * pz;
-    const Lanes eu = su * (dx - a * dz) * inverse_z, ev = sv * (dy - b * dz) * inverse_z;
-    const Lanes k_squared = one + eu * eu + ev * ev;
-    Lanes k = k_squared;
-    for (int i = 0; i < kLanes; ++i) k[i] = std::sqrt(k[i]);
-    const Lanes c = one / (k + k_squared);
-    const Lanes uu = one - c * eu * eu, uv = zero - c * eu * ev, vv = one - c * ev * ev;
-    const Lanes raw_ru = su * a + (cx - u) * inverse_sigma, raw_rv = sv * b + (cy - v) * inverse_sigma;
-    const Lanes ru = uu * raw_ru + uv * raw_rv, rv = uv * raw_ru + vv * raw_rv;
-    // Whitened d(pixel) / d(rotation, translation) for x_in_cam -> Exp(rotation) x_in_cam + translation.
-    Lanes ju[6] = {-su * a * b, su * (1.0 + a * a), -su * b, su * inverse_z, zero, -su * a * inverse_z};
-    Lanes jv[6] = {-sv * (1.0 + b * b), sv * a * b, sv * a, zero, sv * inverse_z, -sv * b * inverse_z};
-#pragma GCC unroll 6
-    for (int i = 0; i < 6; ++i) {
-      const Lanes raw_ju = ju[i];
-      ju[i] = uu * raw_ju + uv * jv[i];
-      jv[i] = uv * raw_ju + vv * jv[i];
-    }
+    const Lanes eu = ju[3] * (dx - a * dz), ev = jv[4] * (dy - b * dz);
+    const Lanes known = one / (one + eu * eu + ev * ev);
+    const Lanes uu = one - known * eu * eu, uv = -known * eu * ev, vv = one - known * ev * ev;
+    const Lanes qu = uu * ru + uv * rv, qv = uv * ru + vv * rv;
     // A point that a step takes behind the camera has no derivative; it counts as one focal length of
     // error, so that leaving the view is no way to lower the cost.
-    const Lanes e2 = in_front ? ru * ru + rv * rv : su * su;
+    const Lanes e2 = in_front ? ru * qu + rv * qv : su * su;
     Lanes e = e2 < min_error ? min_error : e2;
     for (int k = 0; k < kLanes; ++k) e[k] = std::sqrt(e[k]);
     const auto is_linear = e2 > zero + delta_squared;
@@ -101,7 +92,7 @@ void Accumulate(const PoseObservations& o, const Rigid3& cam_from_world, double 
     int entry = 0;
 #pragma GCC unroll 6
     for (int row = 0; row < 6; ++row) {
-      const Lanes wu = w * ju[row], wv = w * jv[row];
+      const Lanes wu = w * (uu * ju[row] + uv * jv[row]), wv = w * (uv * ju[row] + vv * jv[row]);
       gradient[row] += wu * ru + wv * rv;
 #pragma GCC unroll 6
       for (int col = row; col < 6; ++col, ++entry) hessian[entry] += wu * ju[col] + wv * jv[col];

@@ -178,16 +178,11 @@ DS_DISPATCH_POPCNT
 int PastViews::View::Nearest(const Descriptor& descriptor, int octave, const Eigen::Vector2d& a,
                              const Eigen::Vector2d& b, double radius_px) const {
   int nearest = 257;
-  const Eigen::Vector2d middle = 0.5 * (a + b);
-  const double half_length_px = 0.5 * (a - b).norm(), squared_radius = radius_px * radius_px;
-  const auto visit = [&](uint32_t j) __attribute__((always_inline)) {
-    const Keypoint& keypoint = features.keypoints[j];
-    if (half_length_px > 0 && SquaredDistanceToSegment({keypoint.x, keypoint.y}, a, b) > squared_radius)
-      return;
-    nearest = std::min(nearest, HammingDistance(descriptor, features.descriptors[j]));
-  };
-  grid.ForEachInWindow(static_cast<float>(middle.x()), static_cast<float>(middle.y()),
-                       static_cast<float>(half_length_px + radius_px), octave - 1, octave + 1, visit);
+  grid.ForEachAlong(
+      a.cast<float>(), b.cast<float>(), static_cast<float>(radius_px), octave - 1,
+      octave + 1, [&](uint32_t j) __attribute__((always_inline)) {
+        nearest = std::min(nearest, HammingDistance(descriptor, features.descriptors[j]));
+      });
   return nearest;
 }
 
