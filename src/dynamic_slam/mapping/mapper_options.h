@@ -14,7 +14,8 @@ struct MapperOptions {
   int fixed_keyframes = 40;
   double redundant_ratio = 0.9;
   int interrupting_keyframes = 1;
-  BundleOptions local_bundle;
+  // With half the steps the scale drifts among people: that is what a bundle finds last.
+  BundleOptions local_bundle{.max_iterations = 10};
   BundleOptions final_bundle{.max_iterations = 20, .refine_iterations = 20, .function_tolerance = 1e-5};
 
   template <class Self, class Visitor>
