@@ -41,8 +41,8 @@ class Landmark {
   // From max_distance it shows in octave 0, from nearer in coarser octaves, from min_distance in the last.
   float min_distance() const { return min_distance_; }
   float max_distance() const { return max_distance_; }
-  // How far it may be off along the normal: one standard deviation in world, for keypoints of octave 0 that
-  // are off by one focal length. Times the sigma of a keypoint over the focal length it is a length.
+  // One standard deviation of its place along the normal, in world, if keypoints of octave 0 were off by one
+  // focal length: divided by the focal length in px it is for those that are off by one pixel.
   const Eigen::Vector3f& spread() const { return spread_; }
   const Descriptor& descriptor() const { return descriptor_; }  // the observation's nearest to all others
 
