@@ -277,7 +277,13 @@ void Map::RefreshLandmark(LandmarkId id) {
 
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double log_distance_sum = 0;
+  struct Sight {
+    Eigen::Vector3d direction;  // from the camera to the landmark
+    double scale;               // of the keypoint's octave
+  };
+  std::vector<Sight> sights;
   std::vector<const Descriptor*> descriptors;
+  sights.reserve(count);
   descriptors.reserve(count);
   for (const Observation& observation : landmark.observations_) {
     const Keyframe& keyframe = keyframes_.At(observation.keyframe);
@@ -287,6 +293,7 @@ void Map::RefreshLandmark(LandmarkId id) {
     // Seen in octave o at this distance, it would be seen in octave 0 from `scale` times as far.
     const float scale = octave_scales_[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];
     log_distance_sum += std::log(std::max(distance, 1e-12) * scale);
+    sights.push_back({direction, scale});
     descriptors.push_back(&keyframe.features().descriptors[observation.keypoint]);
   }
   landmark.normal_ = normal.normalized().cast<float>();
@@ -296,12 +303,9 @@ void Map::RefreshLandmark(LandmarkId id) {
   // An observation tells of a move along the normal what it sees from aside.
   double information = 0;
   const Eigen::Vector3d mean = landmark.normal_.cast<double>();
-  for (const Observation& observation : landmark.observations_) {
-    const Keyframe& keyframe = keyframes_.At(observation.keyframe);
-    const Eigen::Vector3d direction = landmark.position_ - keyframe.CenterInWorld();
-    const double scale = octave_scales_[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];
-    information +=
-        direction.cross(mean).squaredNorm() / std::max(std::pow(direction.squaredNorm() * scale, 2), 1e-24);
+  for (const Sight& sight : sights) {
+    information += sight.direction.cross(mean).squaredNorm() /
+                   std::max(std::pow(sight.direction.squaredNorm() * sight.scale, 2), 1e-24);
   }
   landmark.spread_ = landmark.normal_ / static_cast<float>(std::sqrt(std::max(information, 1e-24)));
 
