@@ -28,7 +28,7 @@ SEQUENCE, BAG = "", ""
 def setUpModule():
     global GRAPH, NETWORK, SEQUENCE, BAG
     NETWORK = Network()
-    GRAPH = ros_graph.Graph(BUILD, "127.0.0.1" if NETWORK.problem else Network.HERE)
+    GRAPH = ros_graph.Graph(BUILD, "127.0.0.1" if NETWORK.problem else NETWORK.here)
     SEQUENCE, BAG = walk_film.make(PROGRAM, BUILD, GRAPH.path(), FRAMES)
 
 

@@ -64,15 +64,15 @@ class Node:
 
 
 class Network:
-    """A network namespace whose one cable ends here."""
-
-    HERE, THERE = "10.213.77.1", "10.213.77.2"
+    """A network namespace whose one cable ends here, at addresses that no run that was killed has left taken."""
 
     def __init__(self):
         self.name = f"ds{os.getpid() % 100000}"
+        subnet, last = random.SystemRandom().randrange(256), 4 * random.SystemRandom().randrange(64)
+        self.here, self.there = (f"10.213.{subnet}.{last + end}" for end in (1, 2))
         commands = (f"netns add {self.name}", f"link add {self.name}a type veth peer name {self.name}b",
-                    f"link set {self.name}b netns {self.name}", f"addr add {self.HERE}/30 dev {self.name}a",
-                    f"link set {self.name}a up", f"-n {self.name} addr add {self.THERE}/30 dev {self.name}b",
+                    f"link set {self.name}b netns {self.name}", f"addr add {self.here}/30 dev {self.name}a",
+                    f"link set {self.name}a up", f"-n {self.name} addr add {self.there}/30 dev {self.name}b",
                     f"-n {self.name} link set {self.name}b up", f"-n {self.name} link set lo up")
         self.problem = ""
         for command in commands:
@@ -147,7 +147,7 @@ class Graph:
         command, environment = [os.path.join(self.build, program), *arguments], dict(os.environ)
         if network is not None:
             command = ["ip", "netns", "exec", network.name, *command]
-            environment["ROS_IP"] = Network.THERE
+            environment["ROS_IP"] = network.there
         node = Node(command, environment, self.path(f"log{self.count}.txt"))
         self.nodes.append(node)
         self.count += 1

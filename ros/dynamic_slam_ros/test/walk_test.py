@@ -35,7 +35,7 @@ class WalkTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.network = Network()
-        cls.graph = ros_graph.Graph(BUILD, "127.0.0.1" if cls.network.problem else Network.HERE)
+        cls.graph = ros_graph.Graph(BUILD, "127.0.0.1" if cls.network.problem else cls.network.here)
         cls.bag = cls.graph.path("walk.bag")
         subprocess.run([os.path.join(BUILD, "make_bag"), SOURCE, cls.bag, "--camera", "tum_fr1"], check=True)
         cls.truth = horn.read_tum(os.path.join(SOURCE, "groundtruth.txt"))
