@@ -14,7 +14,6 @@ namespace dynamic_slam {
 namespace {
 
 // No keypoint fits into a smaller image.
-constexpr int kMinSizePx = 16;
 
 // Distorted normalised coordinates and, when asked for, their 2x2 derivative.
 Eigen::Vector2d DistortNormalised(const Camera& camera, const Eigen::Vector2d& x, Eigen::Matrix2d* jacobian) {
@@ -156,11 +155,17 @@ void Camera::Validate() const {
           fmt::format("width and height must be positive, are {} x {}", width, height));
   require(width <= 0 || height <= 0 || (width >= kMinSizePx && height >= kMinSizePx),
           fmt::format("width and height must be at least {}, are {} x {}", kMinSizePx, width, height));
-  require(std::isfinite(fx) && fx > 0, fmt::format("fx must be positive, is {}", fx));
-  require(std::isfinite(fy) && fy > 0, fmt::format("fy must be positive, is {}", fy));
+  require(width <= kMaxSizePx && height <= kMaxSizePx,
+          fmt::format("width and height must be at most {}, are {} x {}", kMaxSizePx, width, height));
+  for (const auto& [name_of, focal] : {std::pair("fx", fx), std::pair("fy", fy)}) {
+    require(std::isfinite(focal) && focal > 0, fmt::format("{} must be positive, is {}", name_of, focal));
+    require(!(focal > 0) || !std::isfinite(focal) || (focal >= kMinFocalPx && focal <= kMaxFocalPx),
+            fmt::format("{} must lie between {} and {}, is {}", name_of, kMinFocalPx, kMaxFocalPx, focal));
+  }
   require(std::isfinite(cx) && cx > 0 && cx < width, fmt::format("cx must lie in the image, is {}", cx));
   require(std::isfinite(cy) && cy > 0 && cy < height, fmt::format("cy must lie in the image, is {}", cy));
   require(std::isfinite(fps) && fps >= 0, fmt::format("fps must not be negative, is {}", fps));
+  require(!(fps > kMaxFps), fmt::format("fps must be at most {}, is {}", kMaxFps, fps));
   bool finite = true;
   for (const double k : {k1, k2, p1, p2, k3, k4}) finite = finite && std::isfinite(k);
   require(finite, "distortion coefficients must be finite");

@@ -27,6 +27,11 @@ enum class LensModel {
 // The SLAM works in *ideal* pixels: what a distortion-free pinhole with the same fx, fy, cx, cy would see.
 // Keypoints are undistorted once, at extraction. Pixel (0, 0) is the centre of the top left pixel.
 struct DYNAMIC_SLAM_API Camera {
+  // What Validate takes, and a camera file too.
+  static constexpr int kMinSizePx = 16, kMaxSizePx = 100000;
+  static constexpr double kMinFocalPx = 1e-3, kMaxFocalPx = 1e6;
+  static constexpr double kMaxFps = 1e5;
+
   // Rays of a fisheye farther from the optical axis are not used: in the ideal image the noise of a pixel
   // grows along the radius with 1 / cos^2, 4 times at 60 deg.
   static constexpr double kMaxIncidenceRad = std::numbers::pi / 3;
@@ -85,9 +90,9 @@ struct DYNAMIC_SLAM_API Camera {
   // max_y}.
   std::array<double, 4> IdealBounds() const;
 
-  // Throws InputError naming each violated constraint (sizes and focal lengths positive and finite, principal
-  // point inside the image, no coefficients of the other model, distortion invertible over what the image
-  // shows).
+  // Throws InputError naming each violated constraint (sizes, focal lengths and rate within the limits,
+  // principal point inside the image, no coefficients of the other model, distortion invertible over what the
+  // image shows).
   void Validate() const;
 };
 

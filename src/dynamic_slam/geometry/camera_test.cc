@@ -279,6 +279,10 @@ TEST(CameraValidate, NamesTheCameraAndWhatIsWrong) {
   EXPECT_THAT(Complaint([](Camera& c) { c.cy = std::numeric_limits<double>::quiet_NaN(); }),
               HasSubstr("cy must lie in the image, is nan"));
   EXPECT_THAT(Complaint([](Camera& c) { c.fps = -30; }), HasSubstr("fps must not be negative, is -30"));
+  EXPECT_THAT(Complaint([](Camera& c) { c.fps = 1e6; }), HasSubstr("fps must be at most 100000"));
+  EXPECT_THAT(Complaint([](Camera& c) { c.fy = 7186850; }),
+              HasSubstr("fy must lie between 0.001 and 1000000, is 7186850"));
+  EXPECT_THAT(Complaint([](Camera& c) { c.width = 200000; }), HasSubstr("at most 100000, are 200000 x 480"));
   EXPECT_THAT(Complaint([](Camera& c) { c.p2 = std::numeric_limits<double>::infinity(); }),
               HasSubstr("distortion coefficients must be finite"));
   EXPECT_THAT(Complaint([](Camera& c) { c.k1 = -3; }), HasSubstr("cannot be inverted over the whole image"));

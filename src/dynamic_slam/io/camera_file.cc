@@ -25,15 +25,15 @@ struct CameraFields {
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
-    constexpr double kMaxPx = 1e6;
+    constexpr double kMinPx = Camera::kMinFocalPx, kMaxPx = Camera::kMaxFocalPx;
     auto& c = self.camera;
     visit("name", c.name, OptionField{"", 0, 0, ""});
     visit("model", self.model, OptionField{"", 0, 0, "pinhole or kannala_brandt (fisheye)."});
-    visit("width", c.width, OptionField{"px", 1, 100000, "Size of the raw image."});
-    visit("height", c.height, OptionField{"px", 1, 100000, ""});
-    visit("fps", c.fps, OptionField{"Hz", 0, 1e5, "Frames per second; 0: unknown."});
-    visit("fx", c.fx, OptionField{"px", 1e-3, kMaxPx, "Focal lengths."});
-    visit("fy", c.fy, OptionField{"px", 1e-3, kMaxPx, ""});
+    visit("width", c.width, OptionField{"px", 1, Camera::kMaxSizePx, "Size of the raw image."});
+    visit("height", c.height, OptionField{"px", 1, Camera::kMaxSizePx, ""});
+    visit("fps", c.fps, OptionField{"Hz", 0, Camera::kMaxFps, "Frames per second; 0: unknown."});
+    visit("fx", c.fx, OptionField{"px", kMinPx, kMaxPx, "Focal lengths."});
+    visit("fy", c.fy, OptionField{"px", kMinPx, kMaxPx, ""});
     visit("cx", c.cx,
           OptionField{"px", 0, kMaxPx, "Principal point; (0, 0) is the centre of the top left pixel."});
     visit("cy", c.cy, OptionField{"px", 0, kMaxPx, ""});

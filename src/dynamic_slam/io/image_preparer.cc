@@ -17,8 +17,6 @@
 namespace dynamic_slam {
 namespace {
 
-constexpr int kMinSizePx = 16;  // as Camera::Validate
-
 struct BayerPattern {
   const char* name;        // colours of pixels (0, 0), (1, 0), (0, 1), (1, 1)
   int to_grey, to_colour;  // OpenCV names a pattern by the pixels (1, 1) and (2, 1)
@@ -62,10 +60,10 @@ cv::Rect CropOf(const Camera& raw, const ImageOptions& options) {
         fmt::format("the crop of {} x {} px at ({}, {}) {}", crop.width, crop.height, crop.x, crop.y, reason),
         remedy);
   };
-  if (width < kMinSizePx || height < kMinSizePx || crop.x + width > raw.width ||
+  if (width < Camera::kMinSizePx || height < Camera::kMinSizePx || crop.x + width > raw.width ||
       crop.y + height > raw.height) {
     refuse(fmt::format("is outside of the images of {} x {} px, or smaller than {} px", raw.width, raw.height,
-                       kMinSizePx),
+                       Camera::kMinSizePx),
            "Choose a part of the raw images.");
   }
   if (!(raw.cx > crop.x && raw.cx < crop.x + width && raw.cy > crop.y && raw.cy < crop.y + height)) {
@@ -86,11 +84,11 @@ Camera PreparedCamera(const Camera& raw, const cv::Rect& crop, int resize_width)
   if (resize_width == 0 || resize_width == crop.width) return camera;
   camera.width = resize_width;
   camera.height = static_cast<int>(std::lround(static_cast<double>(crop.height) * resize_width / crop.width));
-  if (camera.width < kMinSizePx || camera.height < kMinSizePx) {
+  if (camera.width < Camera::kMinSizePx || camera.height < Camera::kMinSizePx) {
     throw InputError(
         "image.resize_width",
         fmt::format("{} px makes images of {} x {} px", resize_width, camera.width, camera.height),
-        fmt::format("Both sides must have at least {} px.", kMinSizePx));
+        fmt::format("Both sides must have at least {} px.", Camera::kMinSizePx));
   }
   // The height is rounded, so that the two scales differ slightly.
   const double scale_x = static_cast<double>(camera.width) / crop.width;

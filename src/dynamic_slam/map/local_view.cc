@@ -1,6 +1,7 @@
 #include "dynamic_slam/map/local_view.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace dynamic_slam {
 namespace {
@@ -21,6 +22,26 @@ void FetchAhead(const Landmark* landmark) {
 }
 
 }  // namespace
+
+void LocalViewBuilder::CopiedSet::Begin(size_t most) {
+  ++build_;
+  if (entries_.size() >= 2 * most && !entries_.empty()) return;
+  entries_.assign(std::bit_ceil(std::max<size_t>(2 * most, 1024)), {});
+  shift_ = 32 - std::countr_zero(entries_.size());
+}
+
+bool LocalViewBuilder::CopiedSet::Add(LandmarkId id) {
+  const size_t mask = entries_.size() - 1;
+  // Fibonacci hashing (Knuth, The Art of Computer Programming 3, 6.4): ids that follow each other lie apart.
+  for (size_t at = (id.value() * 2654435769u) >> shift_;; at = (at + 1) & mask) {
+    Entry& entry = entries_[at];
+    if (entry.build != build_) {
+      entry = {id, build_};
+      return true;
+    }
+    if (entry.id == id) return false;
+  }
+}
 
 void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes,
                              LocalView* view) {
@@ -72,13 +93,11 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     }
   }
 
-  ++build_;
-  visited_by_.resize(map.landmarks().CreatedCount(), 0);
+  copied_.Begin(map.landmarks().size());
   landmarks_.clear();
   for (const KeyframeId keyframe : keyframes_) {
     for (const LandmarkId id : map.keyframes().At(keyframe).landmarks()) {
-      if (!id.IsValid() || visited_by_[id.value()] == build_) continue;
-      visited_by_[id.value()] = build_;
+      if (!id.IsValid() || !copied_.Add(id)) continue;
       landmarks_.push_back(&map.landmarks().At(id));
       view->ids.push_back(id);
     }

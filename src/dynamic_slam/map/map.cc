@@ -258,14 +258,13 @@ void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {
   // Evidence of one point, from different sightings.
   survivor.static_log_odds =
       std::clamp(survivor.static_log_odds + static_log_odds, -kMaxStaticLogOdds, kMaxStaticLogOdds);
-  if (merged_into_.size() <= from.value()) merged_into_.resize(from.value() + 1);
-  merged_into_[from.value()] = into;
+  merges_.Add(from, into);
   RefreshLandmark(into);
 }
 
 LandmarkId Map::Resolve(LandmarkId id) const {
   while (id.IsValid() && !landmarks_.Contains(id)) {
-    id = id.value() < merged_into_.size() ? merged_into_[id.value()] : LandmarkId();
+    id = merges_.Into(id);
   }
   return id;
 }

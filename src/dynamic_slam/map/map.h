@@ -9,6 +9,7 @@
 #include "dynamic_slam/map/id_table.h"
 #include "dynamic_slam/map/keyframe.h"
 #include "dynamic_slam/map/landmark.h"
+#include "dynamic_slam/map/merge_log.h"
 
 namespace dynamic_slam {
 
@@ -79,7 +80,8 @@ class Map {
   // The landmark `from` is the same point as `into`: moves its observations and erases it.
   void MergeLandmarks(LandmarkId from, LandmarkId into);
 
-  // What became of a landmark: itself, the one it was merged into, or not valid when it is gone.
+  // What became of a landmark: itself, the one it was merged into, or not valid when it is gone. For those
+  // who knew it a while ago: merges of long ago are forgotten (MergeLog).
   LandmarkId Resolve(LandmarkId id) const;
 
   // Recomputes normal, distances and descriptor from the observations.
@@ -129,8 +131,8 @@ class Map {
   IdTable<LandmarkId, Landmark> landmarks_;
   PlaceIndex places_;
   std::vector<KeyframeId> origins_{KeyframeId()};  // by part
-  std::vector<LandmarkId> merged_into_;            // by landmark id; filled as far as needed
-  std::vector<Anchor> heirs_;                      // by keyframe id; not valid while the keyframe lives
+  MergeLog merges_;
+  std::vector<Anchor> heirs_;  // by keyframe id; not valid while the keyframe lives
 };
 
 }  // namespace dynamic_slam

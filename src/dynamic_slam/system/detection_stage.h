@@ -20,7 +20,7 @@
 
 namespace dynamic_slam {
 
-enum class DetectionState {
+enum class DetectionState : uint8_t {
   kOff,       // there is no detector
   kOnTime,    // the boxes are those of this frame
   kNotAsked,  // this frame is not every n-th, or the detector is busy with an earlier one

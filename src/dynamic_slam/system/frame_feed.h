@@ -22,8 +22,8 @@ class FrameFeed {
 // One after the other, as fast as they are taken. The source must outlive the feed, and is the feed's alone.
 std::unique_ptr<FrameFeed> MakeDirectFeed(FrameSource* source);
 
-// At the pace of their time stamps, or of the camera that they come from, read in a thread of its own. A few wait for a tracker
-// that is late for a moment; of more, the oldest is dropped.
+// At the pace of their time stamps, or of the camera that they come from, read in a thread of its own. A few
+// wait for a tracker that is late for a moment; of more, the oldest is dropped.
 std::unique_ptr<FrameFeed> MakeRealtimeFeed(FrameSource* source);
 
 }  // namespace dynamic_slam

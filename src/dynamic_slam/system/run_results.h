@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamic_slam/base/long_list.h"
 #include "dynamic_slam/geometry/metric_scale.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/slam_system.h"
@@ -52,21 +54,21 @@ struct RunSummary {
   std::string last_reason;             // what tracking said last, while it had no pose
   std::vector<SourceProblem> skipped;  // images that could not be used
 
-  // One line of frames.csv.
+  // One line of frames.csv. Small, as a run may last for hours.
   struct FrameRecord {
     double timestamp_s = 0;
+    std::string reason;
+    float tracking_ms = 0;
+    int32_t keypoints = 0, inliers = 0;
+    DynamicKeypoints dynamic;
+    int32_t objects = 0;                            // seen or believed to be in the frame
+    uint32_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
     TrackingState state = TrackingState::kInitialising;
-    int keypoints = 0, inliers = 0;
     KeyframeReason keyframe_reason = KeyframeReason::kNone;
     DetectionState detection = DetectionState::kOff;
-    size_t objects = 0;  // seen or believed to be in the frame
-    DynamicKeypoints dynamic;
-    double tracking_ms = 0;
-    std::string reason;
-    bool map_was_erased = false;                  // the part of the map that the camera was in
-    size_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
+    bool map_was_erased = false;  // the part of the map that the camera was in
   };
-  std::vector<FrameRecord> frames;
+  LongList<FrameRecord> frames;
   double Coverage() const {  // live
     return frames_total == 0 ? 0 : static_cast<double>(frames_tracked) / static_cast<double>(frames_total);
   }

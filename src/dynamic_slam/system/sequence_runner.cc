@@ -51,22 +51,25 @@ class FrameLog {
       ++summary_->reset_count;
       summary_->initialised_at.reset();
     }
-    if (is_tracking) {
-      if (!summary_->initialised_at.has_value()) summary_->initialised_at = summary_->frames.size();
-      tracking_ms_.push_back(result.tracking_ms);
-    }
+    if (is_tracking && !summary_->initialised_at.has_value())
+      summary_->initialised_at = summary_->frames.size();
     if (was_tracking_ && tracking.state == TrackingState::kLost) ++summary_->lost_count;
     was_tracking_ = is_tracking;
     summary_->most_keyframes_waiting = std::max(summary_->most_keyframes_waiting, result.keyframes_waiting);
-    summary_->frames.push_back({timestamp_s, tracking.state, tracking.keypoints, tracking.inliers,
-                                tracking.keyframe_reason, result.objects.state, result.objects.boxes.size(),
-                                tracking.dynamic, result.tracking_ms, tracking.reason,
-                                tracking.part_was_erased, 0, 0});
-    {
-      const auto now = map.Read();
-      summary_->frames.back().map_keyframes = now->keyframes().size();
-      summary_->frames.back().map_landmarks = now->landmarks().size();
-    }
+    const auto [map_keyframes, map_landmarks] = SizesOf(map);
+    summary_->frames.push_back({.timestamp_s = timestamp_s,
+                                .reason = tracking.reason,
+                                .tracking_ms = static_cast<float>(result.tracking_ms),
+                                .keypoints = tracking.keypoints,
+                                .inliers = tracking.inliers,
+                                .dynamic = tracking.dynamic,
+                                .objects = static_cast<int32_t>(result.objects.boxes.size()),
+                                .map_keyframes = map_keyframes,
+                                .map_landmarks = map_landmarks,
+                                .state = tracking.state,
+                                .keyframe_reason = tracking.keyframe_reason,
+                                .detection = result.objects.state,
+                                .map_was_erased = tracking.part_was_erased});
     if (tracking.keypoints > 0) {
       dynamic_ratios_ += static_cast<double>(tracking.dynamic.InBoxes()) / tracking.keypoints;
       summary_->mean_dynamic_ratio = dynamic_ratios_ / static_cast<double>(summary_->frames.size());
@@ -74,14 +77,24 @@ class FrameLog {
     summary_->last_reason = is_tracking ? "" : tracking.reason;
   }
 
-  TimeStatistics TrackingTimes() const { return SummariseTimes(tracking_ms_); }
-
  private:
+  static std::pair<uint32_t, uint32_t> SizesOf(const SharedMap& map) {
+    const auto now = map.Read();
+    return {static_cast<uint32_t>(now->keyframes().size()), static_cast<uint32_t>(now->landmarks().size())};
+  }
+
   RunSummary* summary_;
-  std::vector<double> tracking_ms_;
   double dynamic_ratios_ = 0;  // their sum
   bool was_tracking_ = false;
 };
+
+TimeStatistics TimesOfTrackedFrames(const RunSummary& summary) {
+  std::vector<double> times_ms;
+  for (const RunSummary::FrameRecord& frame : summary.frames) {
+    if (frame.state == TrackingState::kTracking) times_ms.push_back(frame.tracking_ms);
+  }
+  return SummariseTimes(std::move(times_ms));
+}
 
 }  // namespace
 
@@ -150,7 +163,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
   summary.loops = system.loop_report();
   if (system.detector() != nullptr) summary.detector = system.detector()->name();
   summary.detection = system.detection_report();
-  summary.tracking_ms = log.TrackingTimes();
+  summary.tracking_ms = TimesOfTrackedFrames(summary);
   summary.mapping_ms = SummariseTimes(summary.mapping.times_ms);
   summary.peak_rss_mb = PeakRssMb();
   return summary;

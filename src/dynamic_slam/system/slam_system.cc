@@ -127,20 +127,33 @@ void SlamSystem::ThrowIfFailed() const {
   executor_->ThrowIfFailed();
 }
 
+SlamSystem::TrackedFrame::TrackedFrame(const AnchoredPose& pose, bool is_live_in)
+    : timestamp_s(pose.timestamp_s), reference(pose.reference), is_live(is_live_in) {
+  Eigen::Map<Eigen::Vector4f>(rotation_xyzw.data()) = pose.cam_from_reference.rotation.coeffs().cast<float>();
+  Eigen::Map<Eigen::Vector3f>(translation.data()) = pose.cam_from_reference.translation.cast<float>();
+}
+
+AnchoredPose SlamSystem::TrackedFrame::Pose() const {
+  const Eigen::Map<const Eigen::Quaternionf> rotation(rotation_xyzw.data());
+  const Eigen::Map<const Eigen::Vector3f> cam_from_reference(translation.data());
+  return {timestamp_s, reference, Rigid3(rotation.cast<double>(), cam_from_reference.cast<double>())};
+}
+
 void SlamSystem::Remember(const FrameResult& result) {
   const TrackingResult& tracking = result.tracking;
   const Frame& frame = tracker_.frame();
   if (tracking.part_was_erased) {
     const auto map = map_.Read();
-    std::erase_if(tracked_, [&](const TrackedFrame& f) { return !map->PartOf(f.pose.reference).IsValid(); });
+    const auto is_gone = [&](const TrackedFrame& frame) { return !map->PartOf(frame.reference).IsValid(); };
+    tracked_.erase(std::remove_if(tracked_.begin(), tracked_.end(), is_gone), tracked_.end());
     if (backfiller_.has_value()) backfiller_->PartWasErased();
   }
   const bool has_pose = tracking.state == TrackingState::kTracking;
   if (has_pose) {
     if (options_.backfill) {
-      for (const AnchoredPose& earlier : tracking.earlier_frames) tracked_.push_back({earlier, false});
+      for (const AnchoredPose& earlier : tracking.earlier_frames) tracked_.emplace_back(earlier, false);
     }
-    tracked_.push_back({{frame.timestamp_s, frame.reference, frame.cam_from_reference}, true});
+    tracked_.emplace_back(AnchoredPose{frame.timestamp_s, frame.reference, frame.cam_from_reference}, true);
   }
   if (!backfiller_.has_value()) return;
   if (!has_pose || tracking.may_be_erased) {
@@ -214,10 +227,10 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
 
 void SlamSystem::Backfill(const std::function<bool()>& should_stop) {
   std::vector<AnchoredPose> known;
-  for (const TrackedFrame& frame : tracked_) known.push_back(frame.pose);
-  for (const AnchoredPose& pose : backfiller_->Find(known, should_stop)) tracked_.push_back({pose, false});
+  for (const TrackedFrame& frame : tracked_) known.push_back(frame.Pose());
+  for (const AnchoredPose& pose : backfiller_->Find(known, should_stop)) tracked_.emplace_back(pose, false);
   std::stable_sort(tracked_.begin(), tracked_.end(), [](const TrackedFrame& a, const TrackedFrame& b) {
-    return a.pose.timestamp_s < b.pose.timestamp_s;
+    return a.timestamp_s < b.timestamp_s;
   });
 }
 
@@ -287,7 +300,7 @@ std::vector<PartId> SlamSystem::Parts() const {
   const auto map = map_.Read();
   std::vector<PartId> parts = map->Parts();
   std::map<PartId, size_t> frames;
-  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.pose.reference)];
+  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.reference)];
   std::erase_if(parts, [&](PartId part) { return frames[part] == 0; });
   std::stable_sort(parts.begin(), parts.end(), [&](PartId a, PartId b) { return frames[a] > frames[b]; });
   return parts;
@@ -305,8 +318,8 @@ Trajectory SlamSystem::FrameTrajectory(PartId part) const {
   trajectory.reserve(tracked_.size());
   const auto map = map_.Read();
   for (const TrackedFrame& frame : tracked_) {
-    const AnchoredPose& pose = frame.pose;
-    if (map->PartOf(pose.reference) != part) continue;
+    if (map->PartOf(frame.reference) != part) continue;
+    const AnchoredPose pose = frame.Pose();
     trajectory.push_back(
         {pose.timestamp_s, map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse()});
   }
@@ -317,7 +330,7 @@ size_t SlamSystem::LiveFrameCount() const {
   const PartId part = OrMain({});
   const auto map = map_.Read();
   return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(), [&](const TrackedFrame& frame) {
-    return frame.is_live && map->PartOf(frame.pose.reference) == part;
+    return frame.is_live && map->PartOf(frame.reference) == part;
   }));
 }
 

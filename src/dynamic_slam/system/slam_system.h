@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -10,6 +11,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "dynamic_slam/base/long_list.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
@@ -127,9 +129,16 @@ class SlamSystem {
   const SystemOptions& options() const { return options_; }
 
  private:
+  // An AnchoredPose in half the room, since there is one for each frame: float has it to 1e-7 of its length.
   struct TrackedFrame {
-    AnchoredPose pose;
-    bool is_live;  // not given its pose by a later frame
+    double timestamp_s = 0;
+    KeyframeId reference;
+    bool is_live = false;  // not given its pose by a later frame
+    std::array<float, 4> rotation_xyzw{};
+    std::array<float, 3> translation{};
+
+    TrackedFrame(const AnchoredPose& pose, bool is_live_in);
+    AnchoredPose Pose() const;
   };
 
   struct MappedKeyframe {
@@ -160,7 +169,7 @@ class SlamSystem {
   Guarded<LoopReport> loop_report_;
   Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
-  std::vector<TrackedFrame> tracked_;     // in the order of time
+  LongList<TrackedFrame> tracked_;        // in the order of time
   std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work

@@ -11,7 +11,7 @@ struct KeyframePolicyInput {
   int keyframes_waiting = 0;  // that local mapping has not come to yet
 };
 
-enum class KeyframeReason {
+enum class KeyframeReason : uint8_t {
   kNone,        // no keyframe
   kStart,       // one of the two that make a map
   kNewView,     // tracks too little of what was seen since the last keyframe
