@@ -223,7 +223,7 @@ TEST(MapTest, TheSpreadIsHowFarItCanBeOffUnseen) {
   EXPECT_NEAR(landmark.spread().norm(), expected, 0.01 * expected);
   EXPECT_NEAR(landmark.spread().z(), landmark.spread().norm(), 1e-3 * expected);
   landmark.Transform(
-      Sim3(3, Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX())), {1, 2, 3}));
+      Sim3{3, Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX())), {1, 2, 3}});
   EXPECT_NEAR(landmark.spread().norm(), 3 * expected, 0.03 * expected);
   EXPECT_NEAR(landmark.spread().normalized().dot(landmark.normal()), 1, 1e-6);
 }
