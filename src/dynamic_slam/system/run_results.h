@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <exception>
 #include <filesystem>
 #include <optional>
@@ -9,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "dynamic_slam/base/long_list.h"
 #include "dynamic_slam/geometry/metric_scale.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/slam_system.h"
@@ -68,7 +68,7 @@ struct RunSummary {
     DetectionState detection = DetectionState::kOff;
     bool map_was_erased = false;  // the part of the map that the camera was in
   };
-  LongList<FrameRecord> frames;
+  std::deque<FrameRecord> frames;
   double Coverage() const {  // live
     return frames_total == 0 ? 0 : static_cast<double>(frames_tracked) / static_cast<double>(frames_total);
   }

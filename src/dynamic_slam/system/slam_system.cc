@@ -145,7 +145,7 @@ void SlamSystem::Remember(const FrameResult& result) {
   if (tracking.part_was_erased) {
     const auto map = map_.Read();
     const auto is_gone = [&](const TrackedFrame& frame) { return !map->PartOf(frame.reference).IsValid(); };
-    tracked_.erase(std::remove_if(tracked_.begin(), tracked_.end(), is_gone), tracked_.end());
+    std::erase_if(tracked_, is_gone);
     if (backfiller_.has_value()) backfiller_->PartWasErased();
   }
   const bool has_pose = tracking.state == TrackingState::kTracking;

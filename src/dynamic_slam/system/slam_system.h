@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -11,7 +12,6 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "dynamic_slam/base/long_list.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
@@ -169,7 +169,7 @@ class SlamSystem {
   Guarded<LoopReport> loop_report_;
   Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
-  LongList<TrackedFrame> tracked_;        // in the order of time
+  std::deque<TrackedFrame> tracked_;      // in the order of time
   std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work
