@@ -298,5 +298,38 @@ TEST(MapTest, PartsHaveAnOriginEachAndCanBeErased) {
   EXPECT_EQ(map.BeginPart(), PartId(2)) << "ids are never reused";
 }
 
+TEST(IdTable, WhatIsGoneStaysGoneAndTheOthersStay) {
+  struct Value {
+    explicit Value(LandmarkId id_in) : id(id_in) {}
+    LandmarkId id;
+  };
+  IdTable<LandmarkId, Value> table;
+  for (uint32_t i = 0; i < 200; ++i) EXPECT_EQ(table.Emplace().id, LandmarkId(i));
+  const Value* const stays = table.Find(LandmarkId(130));
+  for (uint32_t i = 0; i < 200; ++i) {
+    if (i != 130) table.Erase(LandmarkId(i));
+  }
+  EXPECT_EQ(table.Emplace().id, LandmarkId(200));
+  EXPECT_EQ(table.Find(LandmarkId(130)), stays);
+  EXPECT_EQ(table.Find(LandmarkId(3)), nullptr);
+  EXPECT_FALSE(table.Contains(LandmarkId(199)));
+  std::vector<uint32_t> ids;
+  table.ForEach([&](const Value& value) { ids.push_back(value.id.value()); });
+  EXPECT_THAT(ids, testing::ElementsAre(130, 200));
+  EXPECT_EQ(table.size(), 2u);
+  EXPECT_EQ(table.CreatedCount(), 201u);
+}
+
+TEST(MergeLog, ForgetsTheMergesOfLongAgo) {
+  MergeLog log;
+  EXPECT_FALSE(log.Into(LandmarkId(5)).IsValid());
+  log.Add(LandmarkId(5), LandmarkId(2));
+  EXPECT_EQ(log.Into(LandmarkId(5)), LandmarkId(2));
+  EXPECT_FALSE(log.Into(LandmarkId(5 + 32768)).IsValid());
+  log.Add(LandmarkId(5 + 32768), LandmarkId(7));
+  EXPECT_EQ(log.Into(LandmarkId(5 + 32768)), LandmarkId(7));
+  EXPECT_FALSE(log.Into(LandmarkId(5)).IsValid());
+}
+
 }  // namespace
 }  // namespace dynamic_slam
