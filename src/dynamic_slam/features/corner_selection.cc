@@ -48,7 +48,8 @@ void ShareOverLevels(int wanted, const std::vector<double>& weights, const std::
   }
 }
 
-void CornerSelector::Select(int width, int height, int wanted, int weak_score, std::vector<Corner>* corners) {
+void CornerSelector::Select(int width, int height, int wanted, int weak_score,
+                            std::span<const uint8_t> rounds_late, std::vector<Corner>* corners) {
   constexpr int kRounds = 256;  // the last one takes all that is left
   const size_t count = corners->size();
   if (wanted <= 0) corners->clear();
@@ -73,7 +74,7 @@ void CornerSelector::Select(int width, int height, int wanted, int weak_score, s
   for (const uint32_t index : strongest_first) {
     const Corner& corner = (*corners)[index];
     const int cell = static_cast<int>(corner.y * per_px) * columns + static_cast<int>(corner.x * per_px);
-    const int late = corner.score <= weak_score ? 1 : 0;
+    const int late = (corner.score <= weak_score ? 1 : 0) + (rounds_late.empty() ? 0 : rounds_late[index]);
     round_[index] = static_cast<uint16_t>(std::min(in_cell_[cell]++ + late, kRounds - 1));
     ++in_round_[round_[index]];
   }

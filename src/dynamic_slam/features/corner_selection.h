@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "dynamic_slam/features/fast_detector.h"
@@ -19,8 +20,9 @@ class CornerSelector {
  public:
   // corners: of a level of width x height px, sorted by y, then x. Keeps `wanted` of them, in order of y,
   // then x. A corner with score <= weak_score comes one round later: rather a second good corner than a weak
-  // one.
-  void Select(int width, int height, int wanted, int weak_score, std::vector<Corner>* corners);
+  // one. rounds_late: empty, or by how many rounds each corner comes later beside that.
+  void Select(int width, int height, int wanted, int weak_score, std::span<const uint8_t> rounds_late,
+              std::vector<Corner>* corners);
 
  private:
   std::vector<uint32_t> by_score_;  // indices of corners, strongest first

@@ -59,7 +59,7 @@ std::vector<Corner> HalfStrong(int width, int height) {
 
 TEST(CornerSelector, SpreadsOverStrongAndWeakParts) {
   std::vector<Corner> corners = HalfStrong(320, 240);
-  CornerSelector().Select(320, 240, 300, 5, &corners);
+  CornerSelector().Select(320, 240, 300, 5, {}, &corners);
   EXPECT_EQ(corners.size(), 300u);
   const auto left = std::count_if(corners.begin(), corners.end(), [](const Corner& c) { return c.x < 160; });
   EXPECT_NEAR(static_cast<double>(left), 150, 20);
@@ -67,16 +67,32 @@ TEST(CornerSelector, SpreadsOverStrongAndWeakParts) {
 
 TEST(CornerSelector, WeakCornersComeOneRoundLater) {
   std::vector<Corner> corners = HalfStrong(320, 240);
-  CornerSelector().Select(320, 240, 300, 20, &corners);  // the right half is weak now
+  CornerSelector().Select(320, 240, 300, 20, {}, &corners);  // the right half is weak now
   const auto left = std::count_if(corners.begin(), corners.end(), [](const Corner& c) { return c.x < 160; });
   // The second corners of the left half are stronger and of the same round; what is left goes to the right
   // half.
   EXPECT_GT(left, 280);
   corners = HalfStrong(320, 240);
-  CornerSelector().Select(320, 240, 600, 20, &corners);
+  CornerSelector().Select(320, 240, 600, 20, {}, &corners);
   const auto right =
       std::count_if(corners.begin(), corners.end(), [](const Corner& c) { return c.x >= 160; });
   EXPECT_GT(right, 0);
+}
+
+TEST(CornerSelector, DeferredCornersComeWhenOthersHaveGivenTheirs) {
+  const auto left_of = [](int wanted, uint8_t rounds) {
+    std::vector<Corner> corners = HalfStrong(320, 240);
+    std::vector<uint8_t> rounds_late;
+    for (const Corner& corner : corners) rounds_late.push_back(corner.x < 160 ? rounds : 0);
+    CornerSelector().Select(320, 240, wanted, 5, rounds_late, &corners);
+    EXPECT_EQ(corners.size(), static_cast<size_t>(wanted));
+    return std::count_if(corners.begin(), corners.end(), [](const Corner& c) { return c.x < 160; });
+  };
+  // Of 300 cells of 16 px half are on each side, and each has 16 corners.
+  EXPECT_NEAR(static_cast<double>(left_of(300, 0)), 150, 20);
+  EXPECT_EQ(left_of(300, 3), 0);
+  // Where there are not enough others they come after all: all 2,400 to the right, and 1,600.
+  EXPECT_GT(left_of(4000, 3), 1500);
 }
 
 TEST(CornerSelector, KeepsTheStrongestOfEachCell) {
@@ -88,7 +104,7 @@ TEST(CornerSelector, KeepsTheStrongestOfEachCell) {
           {static_cast<uint16_t>(x), static_cast<uint16_t>(y), 0, 0, static_cast<uint8_t>(best ? 60 : 30)});
     }
   }
-  CornerSelector().Select(100, 100, 100, 5, &corners);
+  CornerSelector().Select(100, 100, 100, 5, {}, &corners);
   ASSERT_EQ(corners.size(), 100u);
   for (const Corner& corner : corners) EXPECT_EQ(corner.score, 60) << corner.x << " " << corner.y;
 }
@@ -98,7 +114,7 @@ TEST(CornerSelector, TiesGoToTheUpperThenTheLeftCorner) {
   for (uint16_t y = 0; y < 20; ++y) {
     for (uint16_t x = 0; x < 20; ++x) corners.push_back({x, y, 0, 0, 50});
   }
-  CornerSelector().Select(20, 20, 1, 5, &corners);
+  CornerSelector().Select(20, 20, 1, 5, {}, &corners);
   ASSERT_EQ(corners.size(), 1u);
   EXPECT_EQ(corners[0].x, 0);
   EXPECT_EQ(corners[0].y, 0);
@@ -107,9 +123,9 @@ TEST(CornerSelector, TiesGoToTheUpperThenTheLeftCorner) {
 TEST(CornerSelector, KeepsAllWhenThereAreTooFewAndNoneWhenNoneIsWanted) {
   std::vector<Corner> corners = HalfStrong(40, 40);
   CornerSelector selector;
-  selector.Select(40, 40, 1000, 5, &corners);
+  selector.Select(40, 40, 1000, 5, {}, &corners);
   EXPECT_EQ(corners.size(), 100u);
-  selector.Select(40, 40, 0, 5, &corners);
+  selector.Select(40, 40, 0, 5, {}, &corners);
   EXPECT_TRUE(corners.empty());
 }
 
@@ -119,7 +135,7 @@ TEST(CornerSelector, ManyCornersInOneCellAreAllReachable) {
   for (uint16_t y = 0; y < 30; ++y) {
     for (uint16_t x = 0; x < 30; ++x) corners.push_back({x, y, 0, 0, 50});
   }
-  CornerSelector().Select(2000, 2000, 800, 5, &corners);
+  CornerSelector().Select(2000, 2000, 800, 5, {}, &corners);
   EXPECT_EQ(corners.size(), 800u);
 }
 

@@ -21,6 +21,12 @@ namespace {
 // of two apart would compete for the same places in the cache.
 int Stride(int width) { return 64 * ((width + 63) / 64 | 1); }
 
+// Of the coarse image that tells which corners are deferred.
+constexpr int kDeferredCell_px = 8;
+
+// Of a cell's corners the first few are the repeatable ones: so many come before the first deferred one.
+constexpr uint8_t kDeferredRounds = 3;
+
 }  // namespace
 
 class OrbExtractor::Impl {
@@ -75,7 +81,7 @@ class OrbExtractor::Impl {
     for (size_t i = 0; i < levels_.size(); ++i) {
       Level& level = levels_[i];
       selector_.Select(level.image.cols, level.image.rows, wanted_[i], options_.fast_threshold,
-                       &level.corners);
+                       RoundsLate(level), &level.corners);
       if (!level.corners.empty()) Describe(level, static_cast<int>(i), features);
     }
     levels_[0].image = cv::Mat();  // the caller's pixels are not ours to keep
@@ -84,6 +90,23 @@ class OrbExtractor::Impl {
   void SetFeatures(int features) {
     DS_CHECK(features > 0, "features={}", features);
     options_.features = features;
+  }
+
+  void SetMinThreshold(int grey_levels) {
+    DS_CHECK(grey_levels > 0, "grey_levels={}", grey_levels);
+    options_.fast_threshold_min = grey_levels;
+  }
+
+  void Defer(std::span<const cv::Rect> areas) {
+    has_deferred_ = !areas.empty();
+    if (!has_deferred_) return;
+    deferred_.create(height_ / kDeferredCell_px + 1, width_ / kDeferredCell_px + 1, CV_8UC1);
+    deferred_.setTo(0);
+    for (const cv::Rect& area : areas) {
+      const cv::Point first = area.tl() / kDeferredCell_px, last = area.br() / kDeferredCell_px;
+      const cv::Rect cells = cv::Rect(first, last + cv::Point(1, 1)) & cv::Rect({}, deferred_.size());
+      if (!cells.empty()) deferred_(cells).setTo(kDeferredRounds);
+    }
   }
 
  private:
@@ -116,6 +139,16 @@ class OrbExtractor::Impl {
     });
   }
 
+  std::span<const uint8_t> RoundsLate(const Level& level) {
+    rounds_late_.clear();
+    if (!has_deferred_) return {};
+    for (const Corner& corner : level.corners) {
+      rounds_late_.push_back(deferred_.at<uint8_t>(cvRound(level.FullY(corner.y)) / kDeferredCell_px,
+                                                   cvRound(level.FullX(corner.x)) / kDeferredCell_px));
+    }
+    return rounds_late_;
+  }
+
   void Describe(Level& level, int octave, FeatureSet* features) {
     SmoothMore(level.smoothed, &level.blurred, &row_);
     for (const Corner& corner : level.corners) {
@@ -138,8 +171,11 @@ class OrbExtractor::Impl {
   CornerSelector selector_;
   SteeredBrief brief_;
   UndistortionTable undistortion_;
-  cv::Mat blind_;    // CV_8UC1, 1 where not Camera::CanSee; empty when the camera can see everywhere
-  cv::Mat blurred_;  // CV_8UC1, the memory of Level::blurred
+  cv::Mat blind_;  // CV_8UC1, 1 where not Camera::CanSee; empty when the camera can see everywhere
+  bool has_deferred_ = false;
+  cv::Mat deferred_;                  // CV_8UC1, rounds by which corners of each cell come late
+  std::vector<uint8_t> rounds_late_;  // of the corners of a level
+  cv::Mat blurred_;                   // CV_8UC1, the memory of Level::blurred
   std::vector<Level> levels_;
   std::vector<double> weights_;          // share of the features: 1 / scale
   std::vector<Downscaler> downscalers_;  // to each level but the finest
@@ -157,6 +193,10 @@ void OrbExtractor::Extract(const cv::Mat& grey, const cv::Mat& mask, FeatureSet*
 }
 
 void OrbExtractor::SetFeatures(int features) { impl_->SetFeatures(features); }
+
+void OrbExtractor::SetMinThreshold(int grey_levels) { impl_->SetMinThreshold(grey_levels); }
+
+void OrbExtractor::Defer(std::span<const cv::Rect> areas) { impl_->Defer(areas); }
 
 std::vector<float> OctaveScales(const OrbOptions& options) {
   std::vector<float> scales;

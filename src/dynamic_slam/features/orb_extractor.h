@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -28,6 +29,13 @@ class OrbExtractor {
 
   // Wanted keypoints per image from now on; used to extract more until the map is initialised.
   void SetFeatures(int features);
+
+  // FAST contrast that every corner has at least, from now on.
+  void SetMinThreshold(int grey_levels);
+
+  // Parts of the image, px, whose keypoints count less from now on: before the first of them is taken, every
+  // cell outside has given several. Nothing: all count alike.
+  void Defer(std::span<const cv::Rect> areas);
 
  private:
   class Impl;

@@ -174,6 +174,45 @@ TEST(OrbExtractor, GivesAsManyFeaturesAsAskedFor) {
   EXPECT_THROW(extractor.SetFeatures(0), InternalError);
 }
 
+TEST(OrbExtractor, DeferredAreasGiveTheirPlacesToOthers) {
+  const cv::Mat image = Texture(640, 480, 6);
+  OrbExtractor extractor(OrbOptions(), TestCamera(640, 480));
+  FeatureSet features;
+  const auto share_inside = [&](const cv::Rect& area) {
+    extractor.Extract(image, cv::Mat(), &features);
+    const auto inside = std::count_if(
+        features.keypoints.begin(), features.keypoints.end(),
+        [&](const Keypoint& keypoint) { return area.contains(cv::Point2f(keypoint.raw_x, keypoint.raw_y)); });
+    return static_cast<double>(inside) / static_cast<double>(features.size());
+  };
+  // Reaches out of the image, as boxes do.
+  const std::vector<cv::Rect> areas{{-40, -30, 360, 560}};
+  const double usual = share_inside(areas[0]);
+  EXPECT_NEAR(usual, 0.5, 0.1);
+  extractor.Defer(areas);
+  EXPECT_LT(share_inside(areas[0]), 0.1);
+  EXPECT_EQ(features.size(), 1000u);
+  extractor.Defer({});
+  EXPECT_EQ(share_inside(areas[0]), usual);
+}
+
+TEST(OrbExtractor, ALowerThresholdFindsWeakerCorners) {
+  cv::Mat image = Texture(640, 480, 6);
+  image.convertTo(image, -1, 0.05, 100);  // contrasts of some 6 grey levels
+  OrbOptions options;
+  options.features = 20000;
+  OrbExtractor extractor(options, TestCamera(640, 480));
+  FeatureSet usual, more, again;
+  extractor.Extract(image, cv::Mat(), &usual);
+  extractor.SetMinThreshold(options.fast_threshold_starved);
+  extractor.Extract(image, cv::Mat(), &more);
+  EXPECT_GT(more.size(), 1.5 * static_cast<double>(usual.size()));
+  extractor.SetMinThreshold(options.fast_threshold_min);
+  extractor.Extract(image, cv::Mat(), &again);
+  EXPECT_TRUE(SameBytes(usual, again));
+  EXPECT_THROW(extractor.SetMinThreshold(0), InternalError);
+}
+
 TEST(OrbExtractor, EachOctaveGetsItsShare) {
   const FeatureSet features = Extract(Texture(640, 480, 6), TestCamera(640, 480));
   std::vector<int> counts(8);

@@ -10,6 +10,7 @@ struct OrbOptions {
   double scale_factor = 1.2;
   int fast_threshold = 16;
   int fast_threshold_min = 7;
+  int fast_threshold_starved = 4;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
@@ -20,6 +21,10 @@ struct OrbOptions {
           OptionField{"grey levels", 1, 255, "FAST contrast preferred; weaker corners fill the gaps."});
     visit("fast_threshold_min", self.fast_threshold_min,
           OptionField{"grey levels", 1, 255, "FAST contrast that every corner has at least."});
+    visit("fast_threshold_starved", self.fast_threshold_starved,
+          OptionField{
+              "grey levels", 1, 255,
+              "The same while no pose is known and dynamic objects leave fewer keypoints than wanted."});
   }
 };
 

@@ -49,7 +49,9 @@ struct DynamicOptions {
     visit("landmark_odds", self.landmark_odds,
           OptionField{"", 0, 1, "Landmarks gather evidence for being at rest over frames (weights)."});
     visit("more_features", self.more_features,
-          OptionField{"", 0, 1, "Extract more keypoints when dynamic boxes take many of them."});
+          OptionField{"", 0, 1,
+                      "Extract more keypoints when dynamic boxes take many of them; while no pose is "
+                      "known, those beside the boxes first."});
     visit("max_feature_factor", self.max_feature_factor,
           OptionField{"", 1, 10, "Times the usual number of keypoints that this may be at most."});
     visit("shield_hidden", self.shield_hidden,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
 namespace {
@@ -63,6 +64,7 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   double factor = is_starting ? options_.initializer.feature_factor : 1.0;
   if (filter_.options().more_features) {
     factor = std::max(factor, std::min(1 / (1 - share_in_boxes_), filter_.options().max_feature_factor));
+    LookBesideBoxes();
   }
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
@@ -73,6 +75,28 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   frame_.reference_unit = 1;
   DS_TRACE("tracking/flow");
   flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
+}
+
+// Where people fill the view, their clothes have more and stronger corners than the ceiling and the floor,
+// and would take all the places. Only until there is a pose: then it tells what is at rest in boxes, and weak
+// corners were seen to lead it astray.
+void Tracker::LookBesideBoxes() {
+  size_t usable = 0;
+  for (size_t i = 0; i < last_.features.size(); ++i) {
+    usable += last_.StaticProbability(i) >= kMinStaticProbability ? 1 : 0;
+  }
+  // A start looks for the same corners in each frame.
+  is_starved_ = !last_has_pose_ && filter_.HasBoxes() &&
+                (is_starved_ || usable < static_cast<size_t>(orb_options_.features));
+  deferred_.clear();
+  if (is_starved_) {
+    for (const Box& box : filter_.Boxes()) {
+      deferred_.emplace_back(cvFloor(box.x), cvFloor(box.y), cvCeil(box.width), cvCeil(box.height));
+    }
+  }
+  extractor_.Defer(deferred_);
+  const int usual = orb_options_.fast_threshold_min;
+  extractor_.SetMinThreshold(is_starved_ ? std::min(usual, orb_options_.fast_threshold_starved) : usual);
 }
 
 TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting,
@@ -247,6 +271,7 @@ void Tracker::Reset() {
   initializer_.Reset();
   filter_.Reset();
   share_in_boxes_ = 0;
+  is_starved_ = false;
   random_ = Random(seed_);
 }
 

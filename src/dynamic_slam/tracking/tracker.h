@@ -100,6 +100,7 @@ class Tracker {
   void ReviewStart(TrackingResult* result);
   // Erases the part of the map in which the camera is, or was last.
   void ErasePart(TrackingResult* result);
+  void LookBesideBoxes();
   void ForgetPose();
   PartId PartOfFrame() const;
   int KeyframesIn(PartId part) const;
@@ -126,7 +127,9 @@ class Tracker {
   MapLocaliser localiser_;
   DynamicFilter filter_;
   KeypointFlow flow_;
-  double share_in_boxes_ = 0;  // of the keypoints, those in the boxes of movers
+  double share_in_boxes_ = 0;       // of the keypoints, those in the boxes of movers
+  bool is_starved_ = false;         // boxes leave too few keypoints
+  std::vector<cv::Rect> deferred_;  // kept for its memory
   uint64_t seed_;
   Random random_;
 
