@@ -7,7 +7,8 @@
 namespace dynamic_slam {
 
 // Seeded random numbers that are the same on every platform and standard library (splitmix64; Steele,
-// Lea and Flood 2014). The standard's distributions are not.
+// Lea and Flood 2014). The standard's distributions are not. Nor is the order in which a compiler evaluates
+// arguments and operands: draws that must not change places stand in statements of their own, or in braces.
 class Random {
  public:
   explicit Random(uint64_t seed) : state_(seed) {}

@@ -26,7 +26,8 @@ class SyntheticWorld {
 
   explicit SyntheticWorld(int points, double noise_px = 0.3) : noise_px_(noise_px), random_(1) {
     for (int i = 0; i < points; ++i) {
-      const Eigen::Vector2d px(random_.Uniform(-200, 840), random_.Uniform(-100, 580));
+      const double y = random_.Uniform(-100, 580), x = random_.Uniform(-200, 840);
+      const Eigen::Vector2d px(x, y);
       positions_.push_back(random_.Uniform(3, 7) * camera_.Unproject(px));
       descriptors_.push_back({random_.Next(), random_.Next(), random_.Next(), random_.Next()});
       angles_rad_.push_back(random_.Uniform(-3, 3));

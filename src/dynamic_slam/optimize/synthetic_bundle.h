@@ -53,8 +53,8 @@ inline BundleProblem SyntheticBundle(const SyntheticBundleOptions& options, Rand
   const double step = 0.1;
   BundleProblem problem;
   for (int i = 0; i < poses; ++i) {
-    const Rigid3 world_from_cam(ExpSo3(GaussianVector(random, 0.05)),
-                                Eigen::Vector3d(step * i, 0, 0) + GaussianVector(random, 0.02));
+    const Eigen::Vector3d sway = GaussianVector(random, 0.02), rotation = GaussianVector(random, 0.05);
+    const Rigid3 world_from_cam(ExpSo3(rotation), Eigen::Vector3d(step * i, 0, 0) + sway);
     problem.poses.push_back({world_from_cam.Inverse(), i < options.fixed_poses});
   }
   while (problem.points.size() < static_cast<size_t>(options.points)) {

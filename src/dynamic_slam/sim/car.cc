@@ -85,8 +85,8 @@ cv::Mat DrawSide(Random& random, const Shape& s, const Paint& paint, double fron
   cv::fillPoly(image, std::vector<std::vector<cv::Point>>{pane}, paint.glass, cv::LINE_AA);
   for (int i = 0; i < 5; ++i) {  // what is reflected
     const double x = random.Uniform(first, front);
-    const cv::Rect streak(at(x, belt + random.Uniform(0.1, 0.3)),
-                          cv::Size(static_cast<int>(6 + random.Index(22)), 8));
+    const cv::Size size(static_cast<int>(6 + random.Index(22)), 8);
+    const cv::Rect streak(at(x, belt + random.Uniform(0.1, 0.3)), size);
     cv::Mat inside = image(streak & cv::Rect(0, 0, image.cols, image.rows));
     inside.forEach<cv::Vec3b>([&](cv::Vec3b& pixel, const int*) {
       if (pixel == cv::Vec3b(52, 46, 40)) pixel = cv::Vec3b(105, 98, 88);
@@ -173,8 +173,8 @@ Car::Car(uint64_t seed) {
   const cv::Scalar colors[] = {{225, 228, 228}, {190, 192, 192}, {115, 116, 118}, {42, 40, 40},
                                {35, 30, 150},   {130, 70, 35},   {80, 50, 25},    {60, 90, 50},
                                {30, 110, 190},  {150, 165, 175}};
-  const Paint paint{
-      colors[random.Index(std::size(colors))] * random.Uniform(0.85, 1.1), {52, 46, 40}, kind == 4};
+  const double light = random.Uniform(0.85, 1.1);
+  const Paint paint{colors[random.Index(std::size(colors))] * light, {52, 46, 40}, kind == 4};
 
   auto body = std::make_shared<Mesh>();
   Surface side_paint = Painted(DrawSide(random, shape, paint, 0.81, 0.185, wheel_radius_m_));

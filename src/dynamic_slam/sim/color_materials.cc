@@ -61,8 +61,9 @@ cv::Mat DrawGrain() {
     sum += 9.0 * smooth(cv::Rect(2 * scale, 2 * scale, kSide, kSide));
   }
   for (int i = 0; i < 900; ++i) {  // specks
-    const cv::Point at(static_cast<int>(random.Index(kSide)), static_cast<int>(random.Index(kSide)));
-    cv::circle(sum, at, 1 + static_cast<int>(random.Index(4)), random.Uniform(70, 185), cv::FILLED);
+    const int y = static_cast<int>(random.Index(kSide)), x = static_cast<int>(random.Index(kSide));
+    const double grey = random.Uniform(70, 185);
+    cv::circle(sum, {x, y}, 1 + static_cast<int>(random.Index(4)), grey, cv::FILLED);
   }
   cv::Mat grey, image;
   sum.convertTo(grey, CV_8U);
@@ -123,11 +124,13 @@ cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_fr
   image.convertTo(folded, CV_32F);
   cv::Mat1f relief(side, side, 0.0f);
   for (int i = 0; i < 60; ++i) {
-    const cv::Point2d at(random.Uniform(0, side), random.Uniform(0, side));
+    const double y = random.Uniform(0, side), x = random.Uniform(0, side);
+    const cv::Point2d at(x, y);
     const double angle = random.Uniform(-0.7, 0.7), length = side * random.Uniform(0.03, 0.16);
     const cv::Point2d half(length * std::cos(angle), length * std::sin(angle));
-    cv::line(relief, cv::Point(at - half), cv::Point(at + half), random.Uniform(-45, 35),
-             1 + static_cast<int>(random.Index(side / 40 + 1)), cv::LINE_AA);
+    const int breadth = 1 + static_cast<int>(random.Index(side / 40 + 1));
+    cv::line(relief, cv::Point(at - half), cv::Point(at + half), random.Uniform(-45, 35), breadth,
+             cv::LINE_AA);
   }
   cv::GaussianBlur(relief, relief, {}, side / 170.0);
   cv::Mat colored;

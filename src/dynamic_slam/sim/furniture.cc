@@ -41,10 +41,11 @@ void AddDesk(World& world, uint64_t seed, const Eigen::Vector2d& position, doubl
   // Books, boxes and cups.
   const int things = 4 + static_cast<int>(random.Index(5));
   for (int i = 0; i < things; ++i) {
-    const Eigen::Vector3d size(random.Uniform(0.06, 0.28), random.Uniform(0.06, 0.28),
-                               random.Uniform(0.02, 0.22));
-    const Eigen::Vector3d at(random.Uniform(-0.32, 0.1), random.Uniform(-0.45, 0.45) * length_m,
-                             kHeight + size.z() / 2);
+    const double height = random.Uniform(0.02, 0.22), width = random.Uniform(0.06, 0.28),
+                 depth = random.Uniform(0.06, 0.28);
+    const Eigen::Vector3d size(depth, width, height);
+    const double y = random.Uniform(-0.45, 0.45) * length_m, x = random.Uniform(-0.32, 0.1);
+    const Eigen::Vector3d at(x, y, kHeight + size.z() / 2);
     const int surface = mesh.AddSurface(Painted(DrawPoster(SubSeed(seed, 10 + i), 128, 128), 1));
     if (random.Index(3) == 0) {
       const std::vector<Mesh::Ring> cup = {{at - Eigen::Vector3d(0, 0, size.z() / 2), 0.035, 0.035},

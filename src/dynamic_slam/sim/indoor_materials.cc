@@ -19,8 +19,12 @@ void Write(Random& random, const cv::Rect& area, double letter, const cv::Scalar
     const int letters =
         3 + static_cast<int>(random.Index(static_cast<uint32_t>(sheet.cols / (0.8 * letter) + 2)));
     for (int i = 0; i < letters; ++i) {
-      text += random.Index(6) == 0 ? ' '
-                                   : static_cast<char>('A' + random.Index(26) + (random.Index(4) != 0) * 32);
+      if (random.Index(6) == 0) {
+        text += ' ';
+        continue;
+      }
+      const char letter = static_cast<char>('A' + random.Index(26));
+      text += random.Index(4) == 0 ? letter : static_cast<char>(letter + 32);
     }
     cv::putText(sheet, text, {0, cvRound(y)}, cv::FONT_HERSHEY_SIMPLEX, letter / 22.0, ink,
                 std::max(1, cvRound(letter / 8)), cv::LINE_AA);
@@ -43,8 +47,9 @@ void Picture(Random& random, const cv::Rect& area, cv::Mat& image) {
     const cv::Point at = AnyPoint(random, sheet);
     const int size = std::max(2, cvRound(std::min(sheet.cols, sheet.rows) * random.Uniform(0.05, 0.4)));
     if (random.Index(2) == 0) {
-      cv::ellipse(sheet, at, {size, std::max(1, size / 2)}, random.Uniform(0, 180), 0, 360,
-                  AnyColor(random, 0.1, 1, 0.8), cv::FILLED, cv::LINE_AA);
+      const cv::Scalar color = AnyColor(random, 0.1, 1, 0.8);
+      cv::ellipse(sheet, at, {size, std::max(1, size / 2)}, random.Uniform(0, 180), 0, 360, color, cv::FILLED,
+                  cv::LINE_AA);
     } else {
       cv::rectangle(sheet, at, at + cv::Point(size, size), AnyColor(random, 0.1, 1, 0.8), cv::FILLED);
     }
@@ -64,12 +69,12 @@ cv::Mat DrawWall(uint64_t seed, int width, int height, const cv::Scalar& color, 
     const double size = 1.0 * std::pow(12.0, random.Uniform());
     const cv::Scalar ink = color * random.Uniform(0.55, 1.15);
     if (random.Index(2) == 0) {
-      cv::ellipse(image, at, {cvCeil(size), cvCeil(size * random.Uniform(0.3, 1))}, random.Uniform(0, 180), 0,
-                  360, ink, cv::FILLED, cv::LINE_AA);
+      const double angle_deg = random.Uniform(0, 180);
+      cv::ellipse(image, at, {cvCeil(size), cvCeil(size * random.Uniform(0.3, 1))}, angle_deg, 0, 360, ink,
+                  cv::FILLED, cv::LINE_AA);
     } else {
-      cv::line(image, at,
-               at + cv::Point(cvRound(random.Uniform(-3, 3) * size), cvRound(random.Uniform(-3, 3) * size)),
-               ink, std::max(1, cvRound(size / 4)), cv::LINE_AA);
+      const int down = cvRound(random.Uniform(-3, 3) * size), right = cvRound(random.Uniform(-3, 3) * size);
+      cv::line(image, at, at + cv::Point(right, down), ink, std::max(1, cvRound(size / 4)), cv::LINE_AA);
     }
   }
   cv::rectangle(image, {0, height - height / 28}, {width, height}, AnyColor(random, 0.25, 0.5, 0.3),
@@ -110,8 +115,8 @@ cv::Mat DrawScreen(uint64_t seed, int width, int height) {
   for (int i = 0; i < windows; ++i) {
     const int w = cvRound(width * random.Uniform(0.35, 0.7)),
               h = cvRound(height * random.Uniform(0.35, 0.75));
-    const cv::Rect window(static_cast<int>(random.Index(width - w)),
-                          static_cast<int>(random.Index(height - h)), w, h);
+    const int y = static_cast<int>(random.Index(height - h)), x = static_cast<int>(random.Index(width - w));
+    const cv::Rect window(x, y, w, h);
     const bool dark = random.Index(2) == 0;
     cv::rectangle(image, window, dark ? cv::Scalar(40, 35, 30) : cv::Scalar(245, 245, 245), cv::FILLED);
     cv::rectangle(image, {window.x, window.y, w, height / 28}, AnyColor(random, 0.3, 0.8), cv::FILLED);
@@ -131,8 +136,9 @@ cv::Mat DrawCarpet(uint64_t seed, int side) {
   cv::Mat image(side, side, CV_8UC3, AnyColor(random, 0.3, 0.5, 0.4));
   AddOctaves(random, side / 4.0, 1, 7, image);
   for (int i = 0; i < side * side / 260; ++i) {
-    cv::circle(image, AnyPoint(random, image), static_cast<int>(random.Index(3)),
-               AnyColor(random, 0.15, 0.75, 0.5), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar color = AnyColor(random, 0.15, 0.75, 0.5);
+    const int radius = static_cast<int>(random.Index(3));
+    cv::circle(image, AnyPoint(random, image), radius, color, cv::FILLED, cv::LINE_AA);
   }
   return image;
 }
@@ -149,8 +155,9 @@ cv::Mat DrawTiles(uint64_t seed, int side, int tiles) {
   }
   AddOctaves(random, side / 8.0, 2, 5, image);
   for (int i = 0; i < side * side / 700; ++i) {
-    cv::circle(image, AnyPoint(random, image), static_cast<int>(random.Index(4)),
-               AnyColor(random, 0.25, 0.9, 0.2), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar color = AnyColor(random, 0.25, 0.9, 0.2);
+    const int radius = static_cast<int>(random.Index(4));
+    cv::circle(image, AnyPoint(random, image), radius, color, cv::FILLED, cv::LINE_AA);
   }
   for (int i = 0; i <= tiles; ++i) {
     cv::line(image, {i * step, 0}, {i * step, side}, base * 0.55, std::max(1, side / 300));
@@ -185,8 +192,9 @@ cv::Mat DrawCeiling(uint64_t seed, int side, int panels) {
   cv::Mat image(side, side, CV_8UC3, cv::Scalar(215, 220, 220));
   const int step = side / panels;
   for (int i = 0; i < side * side / 400; ++i) {
-    cv::circle(image, AnyPoint(random, image), static_cast<int>(random.Index(2)),
-               cv::Scalar::all(random.Uniform(165, 205)), cv::FILLED);
+    const cv::Scalar grey = cv::Scalar::all(random.Uniform(165, 205));
+    const int radius = static_cast<int>(random.Index(2));
+    cv::circle(image, AnyPoint(random, image), radius, grey, cv::FILLED);
   }
   for (int y = 0; y < panels; ++y) {
     for (int x = 0; x < panels; ++x) {

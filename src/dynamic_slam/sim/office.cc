@@ -54,21 +54,23 @@ World MakeOffice(const SceneOptions& options) {
                  {desk.x() + 0.15, desk.y() + shift, 0.73}, std::numbers::pi + random.Uniform(-0.3, 0.3),
                  0.56);
     }
+    const double turned = random.Uniform(-0.9, 0.9);
     AddChair(world, SubSeed(part, 5),
-             {desk.x() - 0.55 - random.Uniform(0, 0.15), desk.y() + random.Uniform(-0.3, 0.3)},
-             random.Uniform(-0.9, 0.9));
+             {desk.x() - 0.55 - random.Uniform(0, 0.15), desk.y() + random.Uniform(-0.3, 0.3)}, turned);
   }
   for (const double side : {-1, 1}) {
     AddDesk(world, SubSeed(seed, side > 0 ? 201 : 202), {-0.1, side * (y - 0.45)},
             -side * std::numbers::pi / 2, 1.8);
+    const double turned = random.Uniform(-0.4, 0.4);
     AddMonitor(world, SubSeed(seed, side > 0 ? 203 : 204),
                {-0.1 + random.Uniform(-0.3, 0.3), side * (y - 0.35), 0.73},
-               -side * std::numbers::pi / 2 + random.Uniform(-0.4, 0.4), 0.56);
+               -side * std::numbers::pi / 2 + turned, 0.56);
     AddPlant(world, SubSeed(seed, side > 0 ? 205 : 206), {x - 0.4, side * (y - 0.4)});
   }
   for (int i = 0; i < 2; ++i) {
+    const double length = random.Uniform(0.9, 1.2);
     AddShelf(world, SubSeed(seed, 210 + static_cast<uint64_t>(i)),
-             {x - 0.2, (2 * i - 1) * random.Uniform(0.7, 1.1)}, std::numbers::pi, random.Uniform(0.9, 1.2));
+             {x - 0.2, (2 * i - 1) * random.Uniform(0.7, 1.1)}, std::numbers::pi, length);
   }
   world.lighting.to_sun = {-0.4, 0.3, 0.9};
   world.lighting.ambient = 0.72f;

@@ -49,18 +49,22 @@ void DrawWindow(Random& random, const Facade& f, const cv::Rect& at, const cv::S
       cv::rectangle(image, {at.x + 3 * at.width / 4, at.y, at.width / 4 + 1, at.height},
                     AnyColor(random, 0.5, 0.95, 0.4), cv::FILLED);
       break;
-    case 1:
-      cv::rectangle(image, {at.x, at.y, at.width, cvRound(at.height * random.Uniform(0.2, 0.9))},
-                    AnyColor(random, 0.5, 0.9, 0.3), cv::FILLED);
+    case 1: {
+      const cv::Scalar blind = AnyColor(random, 0.5, 0.9, 0.3);
+      cv::rectangle(image, {at.x, at.y, at.width, cvRound(at.height * random.Uniform(0.2, 0.9))}, blind,
+                    cv::FILLED);
       break;
+    }
     case 2:
       cv::circle(image, {at.x + at.width / 2, at.y + at.height * 3 / 4}, std::max(2, at.width / 5),
                  cv::Scalar(60, 120, 60), cv::FILLED, cv::LINE_AA);
       break;
-    default:
+    default: {
+      const cv::Scalar color = cv::Scalar(150, 138, 125) * random.Uniform(0.5, 1.0);
       cv::line(image, {at.x, at.y + at.height},
-               {at.x + at.width, at.y + cvRound(at.height * random.Uniform(0, 0.6))},
-               cv::Scalar(150, 138, 125) * random.Uniform(0.5, 1.0), std::max(1, at.width / 8), cv::LINE_AA);
+               {at.x + at.width, at.y + cvRound(at.height * random.Uniform(0, 0.6))}, color,
+               std::max(1, at.width / 8), cv::LINE_AA);
+    }
   }
   const int thick = std::max(1, cvRound(0.07 * f.per_m_x));
   cv::rectangle(image, at, frame, thick);
@@ -99,8 +103,9 @@ void DrawGroundFloor(Random& random, const Facade& f, double width_m, const cv::
       const cv::Rect pane = f.Area(x, 0.5, w, 2.2);
       cv::rectangle(image, pane, {58, 50, 42}, cv::FILLED);
       for (int i = 0; i < 14; ++i) {
-        const cv::Rect thing = f.Area(x + random.Uniform(0.05, 0.8) * w, 0.55 + random.Uniform(0, 1.4),
-                                      random.Uniform(0.1, 0.6), random.Uniform(0.1, 0.7));
+        const double high = random.Uniform(0.1, 0.7), wide = random.Uniform(0.1, 0.6),
+                     up = random.Uniform(0, 1.4), along = random.Uniform(0.05, 0.8) * w;
+        const cv::Rect thing = f.Area(x + along, 0.55 + up, wide, high);
         cv::rectangle(image, thing & pane, AnyColor(random, 0.2, 0.95, 0.7), cv::FILLED);
       }
       cv::rectangle(image, pane, frame, 2);
@@ -122,7 +127,8 @@ cv::Mat DrawFacade(uint64_t seed, int width, int height, double width_m, double 
   const Facade f{width / width_m, height / height_m, width, height};
   const cv::Scalar warm[] = {{150, 190, 215}, {170, 205, 225}, {120, 150, 190}, {95, 115, 165},
                              {190, 205, 210}, {160, 175, 175}, {110, 130, 140}, {140, 170, 160}};
-  const cv::Scalar color = warm[random.Index(std::size(warm))] * random.Uniform(0.75, 1.1);
+  const double light = random.Uniform(0.75, 1.1);
+  const cv::Scalar color = warm[random.Index(std::size(warm))] * light;
   cv::Mat image(height, width, CV_8UC3, color);
   if (random.Index(2) == 0) DrawBricks(random, f, color, image);
   AddOctaves(random, height / 3.0, 4, 6, image);
@@ -157,8 +163,10 @@ cv::Mat DrawFacade(uint64_t seed, int width, int height, double width_m, double 
   for (int i = 0; i < cvRound(width_m * height_m / 2); ++i) {  // stains, repairs, what people spray
     const cv::Point at = AnyPoint(random, image);
     const double size = 1.5 * std::pow(8.0, random.Uniform());
-    cv::ellipse(image, at, {cvCeil(size), cvCeil(size * random.Uniform(0.3, 1))}, random.Uniform(0, 180), 0,
-                360, color * random.Uniform(0.55, 1.2), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar ink = color * random.Uniform(0.55, 1.2);
+    const double angle_deg = random.Uniform(0, 180);
+    cv::ellipse(image, at, {cvCeil(size), cvCeil(size * random.Uniform(0.3, 1))}, angle_deg, 0, 360, ink,
+                cv::FILLED, cv::LINE_AA);
   }
   AddOctaves(random, 4, 1, 5, image);
   return image;
@@ -169,8 +177,9 @@ cv::Mat DrawAsphalt(uint64_t seed, int side) {
   cv::Mat image(side, side, CV_8UC3, cv::Scalar(92, 92, 94));
   AddOctaves(random, side / 4.0, 1, 6, image);
   for (int i = 0; i < side * side / 220; ++i) {
-    cv::circle(image, AnyPoint(random, image), static_cast<int>(random.Index(3)),
-               cv::Scalar::all(random.Uniform(50, 150)), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar grey = cv::Scalar::all(random.Uniform(50, 150));
+    const int radius = static_cast<int>(random.Index(3));
+    cv::circle(image, AnyPoint(random, image), radius, grey, cv::FILLED, cv::LINE_AA);
   }
   for (int i = 0; i < 14; ++i) {  // cracks
     cv::Point at = AnyPoint(random, image);
@@ -200,19 +209,24 @@ cv::Mat DrawPaving(uint64_t seed, int side) {
   }
   AddOctaves(random, side / 8.0, 1, 6, image);
   for (int i = 0; i < side * side / 500; ++i) {
-    cv::circle(image, AnyPoint(random, image), static_cast<int>(random.Index(3)),
-               cv::Scalar::all(random.Uniform(70, 200)), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar grey = cv::Scalar::all(random.Uniform(70, 200));
+    const int radius = static_cast<int>(random.Index(3));
+    cv::circle(image, AnyPoint(random, image), radius, grey, cv::FILLED, cv::LINE_AA);
   }
   return image;
 }
 
 cv::Mat DrawLeaves(uint64_t seed, int side) {
   Random random(seed);
-  const cv::Scalar green(45 + random.Uniform(0, 30), 100 + random.Uniform(0, 40), 70 + random.Uniform(0, 40));
+  const double r = 70 + random.Uniform(0, 40), g = 100 + random.Uniform(0, 40),
+               b = 45 + random.Uniform(0, 30);
+  const cv::Scalar green(b, g, r);
   cv::Mat image(side, side, CV_8UC3, green * 0.45);
   for (int i = 0; i < side * side / 40; ++i) {
-    cv::ellipse(image, AnyPoint(random, image), {side / 40 + 1, side / 90 + 1}, random.Uniform(0, 180), 0,
-                360, green * random.Uniform(0.35, 1.35), cv::FILLED, cv::LINE_AA);
+    const cv::Scalar color = green * random.Uniform(0.35, 1.35);
+    const double angle_deg = random.Uniform(0, 180);
+    cv::ellipse(image, AnyPoint(random, image), {side / 40 + 1, side / 90 + 1}, angle_deg, 0, 360, color,
+                cv::FILLED, cv::LINE_AA);
   }
   return image;
 }
@@ -223,8 +237,9 @@ cv::Mat DrawBark(uint64_t seed, int side) {
   AddOctaves(random, side / 4.0, 1, 9, image);
   for (int i = 0; i < side; ++i) {
     const cv::Point at = AnyPoint(random, image);
-    cv::line(image, at, at + cv::Point(static_cast<int>(random.Index(5)) - 2, side / 8),
-             cv::Scalar(30, 42, 52) * random.Uniform(0.5, 2), 2, cv::LINE_AA);
+    const cv::Scalar color = cv::Scalar(30, 42, 52) * random.Uniform(0.5, 2);
+    cv::line(image, at, at + cv::Point(static_cast<int>(random.Index(5)) - 2, side / 8), color, 2,
+             cv::LINE_AA);
   }
   return image;
 }
@@ -239,10 +254,12 @@ cv::Mat DrawSky(uint64_t seed, int width, int height) {
   // Clouds: soft, so that nothing in them is a corner. Three times as wide, so that the seam does not show.
   cv::Mat1f wide(height, 3 * width, 0.0f);
   for (int i = 0; i < 160; ++i) {
-    const cv::Point at(static_cast<int>(random.Index(width)),
-                       static_cast<int>(random.Uniform(0.15, 0.49) * height));
-    const cv::Size radii(cvRound(width * random.Uniform(0.01, 0.05)),
-                         cvRound(height * random.Uniform(0.008, 0.03)));
+    const int y = static_cast<int>(random.Uniform(0.15, 0.49) * height),
+              x = static_cast<int>(random.Index(width));
+    const cv::Point at(x, y);
+    const int high = cvRound(height * random.Uniform(0.008, 0.03)),
+              wide_px = cvRound(width * random.Uniform(0.01, 0.05));
+    const cv::Size radii(wide_px, high);
     const double share = random.Uniform(0.3, 0.8);
     for (int turn = 0; turn < 3; ++turn) {
       cv::ellipse(wide, at + cv::Point(turn * width, 0), radii, 0, 0, 360, share, cv::FILLED);

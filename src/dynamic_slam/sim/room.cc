@@ -32,7 +32,9 @@ void AddFurniture(Scene& scene, uint64_t seed, double heading_rad) {
   constexpr int kWanted = 12, kTrials = 1000;
   int placed = 0;
   for (int trial = 0; trial < kTrials && placed < kWanted; ++trial) {
-    const Eigen::Vector3d size(random.Uniform(0.3, 0.8), random.Uniform(0.3, 0.8), random.Uniform(0.3, 1.9));
+    const double tall = random.Uniform(0.3, 1.9), width = random.Uniform(0.3, 0.8),
+                 depth = random.Uniform(0.3, 0.8);
+    const Eigen::Vector3d size(depth, width, tall);
     const double radius = 0.5 * size.head<2>().norm();
     const double spread_rad = random.Index(4) == 0 ? std::numbers::pi : 0.9;
     const double direction_rad = heading_rad + random.Uniform(-spread_rad, spread_rad);

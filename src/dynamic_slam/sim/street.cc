@@ -97,9 +97,10 @@ void AddRoadDetails(World& world, uint64_t seed, const Side& side, double corner
     for (double y = -kKerb + 0.4; y < kKerb - 0.4; y += 1.0) flat(line, x, y, 3, 0.5, 0.012);
   }
   for (int i = 0; i < static_cast<int>(length / 4); ++i) {
-    flat(repairs[random.Index(4)], random.Uniform(corner, length - corner - 3),
-         random.Uniform(-kKerb + 0.3, kKerb - 1.5), random.Uniform(0.5, 3), random.Uniform(0.4, 1.3),
-         0.004 + 0.001 * (i % 5));
+    const double dy = random.Uniform(0.4, 1.3), dx = random.Uniform(0.5, 3),
+                 y = random.Uniform(-kKerb + 0.3, kKerb - 1.5),
+                 x = random.Uniform(corner, length - corner - 3);
+    flat(repairs[random.Index(4)], x, y, dx, dy, 0.004 + 0.001 * (i % 5));
   }
   for (const double y : {-kKerb - 0.08, kKerb + 0.08}) {
     for (double x = corner; x < length - corner; x += 12) {
@@ -143,8 +144,10 @@ void AddPavementThings(World& world, uint64_t seed, const Side& side, double sig
       case 2:
         AddBin(world, random.Next(), at, inward);
         break;
-      default:
-        AddTree(world, trees[random.Index(static_cast<uint32_t>(trees.size()))], at, random.Uniform(0, 6.28));
+      default: {
+        const double yaw_rad = random.Uniform(0, 6.28);
+        AddTree(world, trees[random.Index(static_cast<uint32_t>(trees.size()))], at, yaw_rad);
+      }
     }
     if (random.Index(3) == 0) AddPlant(world, random.Next(), side.At(x + 2, sign * (kHouses - 0.55)));
     x += random.Uniform(5, 10);

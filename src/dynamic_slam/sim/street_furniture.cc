@@ -14,6 +14,11 @@ namespace {
 
 const Eigen::Vector3d kX(1, 0, 0), kY(0, 1, 0), kZ(0, 0, 1);
 
+Eigen::Vector3d AnyVector(Random& random) {
+  const double z = random.Gaussian(), y = random.Gaussian(), x = random.Gaussian();
+  return {x, y, z};
+}
+
 Rigid3 Standing(const Eigen::Vector2d& position, double yaw_rad) {
   return {ExpSo3({0, 0, yaw_rad}), {position.x(), position.y(), 0}};
 }
@@ -100,16 +105,14 @@ TreeModel MakeTree(uint64_t seed) {
     const double angle = 2.4 * i, out = radius * 0.55 * std::sqrt(static_cast<double>(i) / kBlobs);
     const Eigen::Vector3d centre(out * std::cos(angle), out * std::sin(angle),
                                  random.Uniform(trunk + 0.7, height - 0.9));
-    const Eigen::Vector3d radii =
-        radius *
-        Eigen::Vector3d(random.Uniform(0.45, 0.65), random.Uniform(0.45, 0.65), random.Uniform(0.4, 0.6));
+    const double z = random.Uniform(0.4, 0.6), y = random.Uniform(0.45, 0.65), x = random.Uniform(0.45, 0.65);
+    const Eigen::Vector3d radii = radius * Eigen::Vector3d(x, y, z);
     tree->AddEllipsoid(crown, centre, radii, 10, 7);
     // Twigs that break the outline.
     for (int k = 0; k < 34; ++k) {
-      Eigen::Vector3d direction(random.Gaussian(), random.Gaussian(), random.Gaussian());
-      direction.normalize();
+      const Eigen::Vector3d direction = AnyVector(random).normalized();
       const Eigen::Vector3d at = centre + direction.cwiseProduct(radii) * random.Uniform(0.9, 1.15);
-      Eigen::Vector3d along(random.Gaussian(), random.Gaussian(), random.Gaussian());
+      Eigen::Vector3d along = AnyVector(random);
       along = (along - 0.6 * along.dot(direction) * direction).normalized();
       const Eigen::Vector3d side = along.cross(direction).normalized();
       const double size = random.Uniform(0.16, 0.34);

@@ -28,6 +28,11 @@ void AddNoise(Random& random, double cell, double amplitude, cv::Mat1f& image) {
 
 cv::Scalar Ink(Random& random) { return cv::Scalar(random.Uniform(15, 240)); }
 
+cv::Point2d AnyPlace(Random& random, const cv::Mat& image) {
+  const double y = random.Uniform(0, image.rows), x = random.Uniform(0, image.cols);
+  return {x, y};
+}
+
 std::vector<cv::Point> Corners(const cv::Point2d& centre, double width, double height, double angle_rad) {
   std::vector<cv::Point> corners;
   for (const auto& [sx, sy] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
@@ -39,13 +44,15 @@ std::vector<cv::Point> Corners(const cv::Point2d& centre, double width, double h
 }
 
 void DrawPatch(Random& random, double size, cv::Mat1b& image) {
-  const cv::Point2d centre(random.Uniform(0, image.cols), random.Uniform(0, image.rows));
+  const cv::Point2d centre = AnyPlace(random, image);
   const double angle_rad = random.Uniform(0, std::numbers::pi);
   switch (random.Index(4)) {
-    case 0:
-      cv::fillConvexPoly(image, Corners(centre, size, size * random.Uniform(0.2, 1.0), angle_rad),
-                         Ink(random), cv::LINE_AA);
+    case 0: {
+      const cv::Scalar ink = Ink(random);
+      cv::fillConvexPoly(image, Corners(centre, size, size * random.Uniform(0.2, 1.0), angle_rad), ink,
+                         cv::LINE_AA);
       break;
+    }
     case 1: {  // any polygon
       std::vector<std::vector<cv::Point>> outline(1);
       const int corners = 3 + static_cast<int>(random.Index(5));
@@ -57,21 +64,23 @@ void DrawPatch(Random& random, double size, cv::Mat1b& image) {
       cv::fillPoly(image, outline, Ink(random), cv::LINE_AA);
       break;
     }
-    case 2:
+    case 2: {
+      const cv::Scalar ink = Ink(random);
       cv::ellipse(image, cv::Point(centre),
                   cv::Size(cvCeil(size / 2), cvCeil(size * random.Uniform(0.1, 0.5))),
-                  angle_rad * 180 / std::numbers::pi, 0, 360, Ink(random), cv::FILLED, cv::LINE_AA);
+                  angle_rad * 180 / std::numbers::pi, 0, 360, ink, cv::FILLED, cv::LINE_AA);
       break;
+    }
     default: {  // a stroke
       const cv::Point2d half(0.8 * size * std::cos(angle_rad), 0.8 * size * std::sin(angle_rad));
-      cv::line(image, cv::Point(centre - half), cv::Point(centre + half), Ink(random),
-               std::max(1, cvRound(size * random.Uniform(0.04, 0.15))), cv::LINE_AA);
+      const int breadth = std::max(1, cvRound(size * random.Uniform(0.04, 0.15)));
+      cv::line(image, cv::Point(centre - half), cv::Point(centre + half), Ink(random), breadth, cv::LINE_AA);
     }
   }
 }
 
 void DrawPoster(Random& random, double size, cv::Mat1b& image) {
-  const cv::Point2d centre(random.Uniform(0, image.cols), random.Uniform(0, image.rows));
+  const cv::Point2d centre = AnyPlace(random, image);
   const double width = size, height = size * random.Uniform(0.6, 1.4);
   const bool dark = random.Index(3) == 0;
   const cv::Scalar paper(dark ? random.Uniform(20, 70) : random.Uniform(180, 245));
