@@ -81,13 +81,15 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
 // and would take all the places. Only until there is a pose: then it tells what is at rest in boxes, and weak
 // corners were seen to lead it astray.
 void Tracker::LookBesideBoxes() {
-  size_t usable = 0;
-  for (size_t i = 0; i < last_.features.size(); ++i) {
-    usable += last_.StaticProbability(i) >= kMinStaticProbability ? 1 : 0;
-  }
+  const auto are_few = [&] {
+    size_t usable = 0;
+    for (size_t i = 0; i < last_.features.size(); ++i) {
+      usable += last_.StaticProbability(i) >= kMinStaticProbability ? 1 : 0;
+    }
+    return usable < static_cast<size_t>(orb_options_.features);
+  };
   // A start looks for the same corners in each frame.
-  is_starved_ = !last_has_pose_ && filter_.HasBoxes() &&
-                (is_starved_ || usable < static_cast<size_t>(orb_options_.features));
+  is_starved_ = !last_has_pose_ && filter_.HasBoxes() && (is_starved_ || are_few());
   deferred_.clear();
   if (is_starved_) {
     for (const Box& box : filter_.Boxes()) {
