@@ -78,8 +78,8 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
 }
 
 // Where people fill the view, their clothes have more and stronger corners than the ceiling and the floor,
-// and would take all the places. Only until there is a pose: then it tells what is at rest in boxes, and weak
-// corners were seen to lead it astray.
+// and would take all the places. Only until there is a pose: then it tells what is at rest in boxes, and with
+// weak corners some paths went wrong (docs/benchmarks.md).
 void Tracker::LookBesideBoxes() {
   const auto are_few = [&] {
     size_t usable = 0;
