@@ -10,11 +10,6 @@
 namespace dynamic_slam {
 namespace {
 
-constexpr double kMatchRatio = 0.9;
-
-// Views beside the outer two: they make the first map more exact, and tell motions apart.
-constexpr size_t kMaxViewsBetween = 6;
-
 // Standard errors by which the better of two motions must be better. Errors of one scene are not independent,
 // so more than the usual three; and max_cost_ratio guards against what no such test sees, a rolling shutter
 // that bends all.
@@ -33,62 +28,9 @@ Initializer::Initializer(const Camera& camera, const InitializerOptions& options
 }
 
 void Initializer::Reset() {
-  reference_.reset();
-  views_ = {};
+  references_.clear();
+  is_reviewing_ = false;
   reason_ = "waiting for the first image";
-}
-
-void Initializer::StartFrom(const Frame& frame) {
-  most_matches_ = 0;
-  reference_ = frame;
-  views_ = {};
-  for (uint32_t i = 0; i < frame.features.size(); ++i) {
-    const Keypoint& keypoint = frame.features.keypoints[i];
-    views_.reference.push_back({i, {keypoint.x, keypoint.y}, ScaleOf(keypoint)});
-  }
-  last_places_.resize(frame.features.size());
-  for (size_t i = 0; i < last_places_.size(); ++i) {
-    last_places_[i] = {frame.features.keypoints[i].x, frame.features.keypoints[i].y};
-  }
-}
-
-std::vector<Match> Initializer::MatchWithReference(const Frame& frame) {
-  const FeatureSet& first = reference_->features;
-  struct Taker {
-    uint32_t reference = WindowMatch::kNone;
-    int distance = 257;
-  };
-  std::vector<Taker> takers(frame.features.size());
-  // What may move takes no part (section 4.3).
-  std::vector<uint8_t> moves(frame.features.size());
-  for (size_t i = 0; i < moves.size(); ++i) moves[i] = frame.StaticProbability(i) < kMinStaticProbability;
-  for (uint32_t i = 0; i < first.size(); ++i) {
-    const int octave = first.keypoints[i].octave;
-    if (octave > options_.max_octave || reference_->MovesForSure(i)) continue;
-    const SearchWindow window{last_places_[i].x(), last_places_[i].y(),
-                              static_cast<float>(options_.search_radius_px), std::max(0, octave - 1),
-                              std::min(octave + 1, options_.max_octave)};
-    const WindowMatch match = FindInWindow(frame.features, frame.grid, window, first.descriptors[i], moves);
-    if (match.distance > kStrictDistance || match.distance > kMatchRatio * match.second_distance) continue;
-    if (match.distance < takers[match.keypoint].distance) takers[match.keypoint] = {i, match.distance};
-  }
-  std::vector<Match> matches;
-  RotationConsistency rotation;
-  for (uint32_t i = 0; i < takers.size(); ++i) {
-    if (takers[i].reference == WindowMatch::kNone) continue;
-    matches.push_back({takers[i].reference, i, takers[i].distance});
-    rotation.Add(first.keypoints[takers[i].reference].angle_rad, frame.features.keypoints[i].angle_rad);
-  }
-  const std::vector<uint8_t>& keep = rotation.Judge();
-  size_t kept = 0;
-  for (size_t i = 0; i < matches.size(); ++i) {
-    if (keep[i] == 0) continue;
-    matches[kept++] = matches[i];
-    const Keypoint& keypoint = frame.features.keypoints[matches[i].second];
-    last_places_[matches[i].first] = {keypoint.x, keypoint.y};
-  }
-  matches.resize(kept);
-  return matches;
 }
 
 std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& random) {
@@ -97,26 +39,68 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
                           frame.features.size(), options_.min_matches);
     return std::nullopt;
   }
-  if (!reference_.has_value()) {
-    StartFrom(frame);
+  if (references_.empty()) {
+    references_.emplace_back(frame, octave_scales_);
     reason_ = "initialising: waiting for a second view";
     return std::nullopt;
   }
-  std::vector<Match> matches = MatchWithReference(frame);
-  most_matches_ = std::max(most_matches_, matches.size());
-  const double min_matches = std::max(static_cast<double>(options_.min_matches),
-                                      options_.min_match_ratio * static_cast<double>(most_matches_));
-  if (static_cast<double>(matches.size()) < min_matches) {
-    reason_ =
-        fmt::format("initialising: {} matches < {:.0f} with the first view; starting again from this one",
-                    matches.size(), min_matches);
-    StartFrom(frame);
+  std::vector<std::vector<Match>> matches = MatchReferences(frame);
+  if (references_.empty()) {
+    references_.emplace_back(frame, octave_scales_);
+    is_reviewing_ = false;
     return std::nullopt;
   }
-  AddView(frame, matches);
+  // The oldest has seen the camera come farthest: what it lacks is told, if none has enough.
+  std::string reason;
+  for (size_t i = 0; i < references_.size(); ++i) {
+    std::optional<InitialProposal> proposal = ProposeFrom(i, frame, std::move(matches[i]), random);
+    if (proposal.has_value()) return proposal;
+    if (i == 0) reason = reason_;
+  }
+  reason_ = reason;
+  AddReferenceIfDue(frame);
+  return std::nullopt;
+}
+
+// Forgets the references of which too little is left.
+std::vector<std::vector<Match>> Initializer::MatchReferences(const Frame& frame) {
+  std::vector<std::vector<Match>> matches;
+  size_t kept = 0;
+  for (ReferenceView& reference : references_) {
+    std::vector<Match> found = reference.MatchWith(frame, options_);
+    const double needed = std::max(static_cast<double>(options_.min_matches),
+                                   options_.min_match_ratio * static_cast<double>(reference.most_matches()));
+    if (static_cast<double>(found.size()) < needed) {
+      reason_ =
+          fmt::format("initialising: {} matches < {:.0f} with the first view; starting again from this one",
+                      found.size(), needed);
+      continue;
+    }
+    reference.AddView(frame, found, octave_scales_);
+    matches.push_back(std::move(found));
+    if (&references_[kept] != &reference) references_[kept] = std::move(reference);
+    ++kept;
+  }
+  references_.erase(references_.begin() + static_cast<std::ptrdiff_t>(kept), references_.end());
+  return matches;
+}
+
+// Before the newest is out of sight, another one takes over; the older ones may still start first.
+void Initializer::AddReferenceIfDue(const Frame& frame) {
+  if (is_reviewing_ || references_.size() >= static_cast<size_t>(options_.max_references)) return;
+  const ReferenceView& newest = references_.back();
+  if (static_cast<double>(newest.views().last.sightings.size()) <
+      options_.renewal_match_ratio * static_cast<double>(newest.most_matches())) {
+    references_.emplace_back(frame, octave_scales_);
+  }
+}
+
+std::optional<InitialProposal> Initializer::ProposeFrom(size_t index, const Frame& frame,
+                                                        std::vector<Match> matches, Random& random) {
+  const InitialViews& views = references_[index].views();
   std::vector<Eigen::Vector2d> first_px, second_px;
-  for (const Sighting& sighting : views_.last.sightings) {
-    first_px.push_back(views_.reference[sighting.reference_keypoint].ideal_px);
+  for (const Sighting& sighting : views.last.sightings) {
+    first_px.push_back(views.reference[sighting.reference_keypoint].ideal_px);
     second_px.push_back(sighting.ideal_px);
   }
   const TwoViewOptions limits = Limits(frame);
@@ -125,28 +109,14 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
     reason_ = "initialising: " + Explain(motion);
     return std::nullopt;
   }
-  std::optional<InitialProposal> proposal = ChooseStructure(motion, limits.min_points);
+  std::optional<InitialProposal> proposal = ChooseStructure(motion, views, limits.min_points);
   if (!proposal.has_value()) return std::nullopt;
   reason_ = fmt::format("initialised{}: {} points, parallax {:.1f} deg, {} views",
                         proposal->is_certain ? "" : " for the time being", proposal->structure.points,
-                        motion.parallax_deg, views_.between.size() + 2);
+                        motion.parallax_deg, views.between.size() + 2);
   proposal->matches = std::move(matches);
+  proposal->reference = index;
   return proposal;
-}
-
-void Initializer::AddView(const Frame& frame, const std::vector<Match>& matches) {
-  if (!views_.last.sightings.empty()) views_.between.push_back(std::move(views_.last));
-  // Of too many views every second one is enough.
-  if (views_.between.size() > kMaxViewsBetween) {
-    for (size_t i = 0; 2 * i + 1 < views_.between.size(); ++i)
-      views_.between[i] = std::move(views_.between[2 * i + 1]);
-    views_.between.resize(views_.between.size() / 2);
-  }
-  views_.last = {frame.timestamp_s, {}};
-  for (const Match& match : matches) {
-    const Keypoint& keypoint = frame.features.keypoints[match.second];
-    views_.last.sightings.push_back({match.first, {keypoint.x, keypoint.y}, ScaleOf(keypoint)});
-  }
 }
 
 TwoViewOptions Initializer::Limits(const Frame& frame) const {
@@ -162,13 +132,14 @@ TwoViewOptions Initializer::Limits(const Frame& frame) const {
   return limits;
 }
 
-std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult& result, int min_points) {
-  if (views_.between.empty()) {
+std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult& result,
+                                                            const InitialViews& views, int min_points) {
+  if (views.between.empty()) {
     reason_ = "initialising: waiting for a third view, to be sure";
     return std::nullopt;
   }
-  std::vector<InitialStructure> structures{RefineMotion(camera_, result.motion, views_)};
-  for (const TwoViewMotion& rival : result.rivals) structures.push_back(RefineMotion(camera_, rival, views_));
+  std::vector<InitialStructure> structures{RefineMotion(camera_, result.motion, views)};
+  for (const TwoViewMotion& rival : result.rivals) structures.push_back(RefineMotion(camera_, rival, views));
   std::stable_sort(
       structures.begin(), structures.end(),
       [](const InitialStructure& a, const InitialStructure& b) { return a.MeanCost() < b.MeanCost(); });
@@ -183,7 +154,7 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
     reason_ = fmt::format(
         "initialising: two motions fit {} views, errors {:.2f} of each other (certain below {:.2f}), "
         "{:.1f} standard errors apart < {:.1f}; show something out of the plane",
-        views_.between.size() + 2, cost_ratio, options_.max_cost_ratio, preference, kMinTryPreference);
+        views.between.size() + 2, cost_ratio, options_.max_cost_ratio, preference, kMinTryPreference);
     return std::nullopt;
   }
   if (!best.usable) {
@@ -195,11 +166,17 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
                           min_points);
     return std::nullopt;
   }
-  return InitialProposal{std::move(best), {}, is_certain};
+  return InitialProposal{std::move(best), {}, is_certain, 0};
 }
 
 std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
   const InitialStructure& structure = proposal.structure;
+  // While the start is uncertain, only its own reference is asked on.
+  std::swap(references_.front(), references_[proposal.reference]);
+  references_.erase(references_.begin() + 1, references_.end());
+  is_reviewing_ = true;
+  Frame& reference = *references_.front().mutable_frame();
+  const InitialViews& views = references_.front().views();
   const std::vector<Match>& matches = proposal.matches;
   std::vector<double> depths;
   for (size_t i = 0; i < matches.size(); ++i) {
@@ -209,13 +186,13 @@ std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal,
   std::nth_element(depths.begin(), middle, depths.end());
   const double scale = 1.0 / *middle;
 
-  reference_->cam_from_world = Rigid3();
-  reference_->ClearLandmarks();
+  reference.cam_from_world = Rigid3();
+  reference.ClearLandmarks();
   frame->cam_from_world = structure.last_from_reference;
   frame->cam_from_world.translation *= scale;
   frame->ClearLandmarks();
   const PartId part = map->BeginPart();
-  const KeyframeId first_id = InsertKeyframe(*reference_, map, part);
+  const KeyframeId first_id = InsertKeyframe(reference, map, part);
   const KeyframeId second_id = InsertKeyframe(*frame, map, part);
   for (size_t i = 0; i < matches.size(); ++i) {
     if (structure.is_good[i] == 0) continue;
@@ -230,12 +207,12 @@ std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal,
   frame->reference = second_id;
   frame->cam_from_reference = Rigid3();
 
-  std::vector<AnchoredPose> earlier{{reference_->timestamp_s, first_id, Rigid3()}};
-  for (size_t i = 0; i < views_.between.size(); ++i) {
+  std::vector<AnchoredPose> earlier{{reference.timestamp_s, first_id, Rigid3()}};
+  for (size_t i = 0; i < views.between.size(); ++i) {
     if (!structure.between_from_reference[i].has_value()) continue;
     Rigid3 pose = *structure.between_from_reference[i];
     pose.translation *= scale;
-    earlier.push_back({views_.between[i].timestamp_s, first_id, pose});
+    earlier.push_back({views.between[i].timestamp_s, first_id, pose});
   }
   return earlier;
 }

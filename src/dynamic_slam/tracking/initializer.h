@@ -11,6 +11,7 @@
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/map.h"
 #include "dynamic_slam/tracking/initial_structure.h"
+#include "dynamic_slam/tracking/reference_view.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 
 namespace dynamic_slam {
@@ -22,6 +23,7 @@ struct InitialProposal {
   // One motion is clearly better than any other. When it is not, a map of the better one is worth a try, but
   // can turn out wrong: go on asking.
   bool is_certain = false;
+  size_t reference = 0;  // which of the Initializer's
 };
 
 // Waits for frames from which the first map can be made: two far enough apart, and one between at least.
@@ -29,7 +31,7 @@ class Initializer {
  public:
   Initializer(const Camera& camera, const InitializerOptions& options, std::vector<float> octave_scales);
 
-  // Matches the frame with the reference frame and tries to find the motion between them and the structure.
+  // Matches the frame with the reference frames and tries to find the motion between them and the structure.
   // Nothing while that is not possible: reason() says why.
   std::optional<InitialProposal> Propose(const Frame& frame, Random& random);
 
@@ -38,32 +40,30 @@ class Initializer {
   // The frames before it that have a pose now, in the order of time.
   std::vector<AnchoredPose> BuildMap(const InitialProposal& proposal, Frame* frame, Map* map);
 
-  // The frame with which all are matched; not valid before the first.
-  FrameId reference() const { return reference_.has_value() ? reference_->id : FrameId(); }
+  // The oldest frame with which all are matched, after BuildMap the one of the map; not valid before the
+  // first.
+  FrameId reference() const { return references_.empty() ? FrameId() : references_.front().frame().id; }
 
   const std::string& reason() const { return reason_; }
   void Reset();
 
  private:
-  void StartFrom(const Frame& frame);
+  std::vector<std::vector<Match>> MatchReferences(const Frame& frame);
+  void AddReferenceIfDue(const Frame& frame);
+  std::optional<InitialProposal> ProposeFrom(size_t index, const Frame& frame, std::vector<Match> matches,
+                                             Random& random);
   // What a start needs in view of what the frame shows.
   TwoViewOptions Limits(const Frame& frame) const;
-  void AddView(const Frame& frame, const std::vector<Match>& matches);
   // The structure that fits all views best; nothing, and the reason, when there is none or another fits as
   // well.
-  std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result, int min_points);
-  double ScaleOf(const Keypoint& keypoint) const {
-    return octave_scales_[static_cast<size_t>(keypoint.octave)];
-  }
-  std::vector<Match> MatchWithReference(const Frame& frame);
+  std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result, const InitialViews& views,
+                                                 int min_points);
 
   Camera camera_;
   InitializerOptions options_;
   std::vector<float> octave_scales_;
-  std::optional<Frame> reference_;
-  InitialViews views_;
-  size_t most_matches_ = 0;                   // of any frame with the reference
-  std::vector<Eigen::Vector2f> last_places_;  // of the reference's keypoints, px
+  std::vector<ReferenceView> references_;  // the oldest first
+  bool is_reviewing_ = false;              // of a map that was made already
   std::string reason_;
 };
 

@@ -81,6 +81,19 @@ TEST_F(InitializerTest, StartsAgainWhenTheFirstViewIsOutOfSight) {
   EXPECT_THAT(initializer_.reason(), HasSubstr("starting again from this one"));
 }
 
+TEST_F(InitializerTest, AViewFromBetweenTakesOverWhenTheFirstIsOutOfSight) {
+  const auto see = [&](int frame) {  // it turns on the spot: no start
+    views_.push_back(world_.See(Rigid3(ExpSo3({0, 0.07 * frame, 0}), {0, 0, 0})));
+    views_.back().frame.id = FrameId(static_cast<uint32_t>(frame));
+    return initializer_.Propose(views_.back().frame, random_).has_value();
+  };
+  int frame = 0;
+  ASSERT_FALSE(see(frame));
+  while (initializer_.reference() == FrameId(0) && frame < 12) ASSERT_FALSE(see(++frame));
+  EXPECT_GT(initializer_.reference(), FrameId(0));
+  EXPECT_LT(initializer_.reference(), FrameId(static_cast<uint32_t>(frame)));
+}
+
 TEST_F(InitializerTest, TooFewKeypointsAreNoFirstView) {
   SyntheticWorld poor(60);
   SyntheticView view = poor.See(Rigid3());

@@ -10,7 +10,9 @@ namespace dynamic_slam {
 struct InitializerOptions {
   double feature_factor = 5.0;
   int min_matches = 100;
-  double min_match_ratio = 0.5;
+  double min_match_ratio = 0.35;
+  double renewal_match_ratio = 0.7;
+  int max_references = 3;
   double search_radius_px = 100;
   int max_octave = 3;
   double max_cost_ratio = 0.75;
@@ -23,12 +25,18 @@ struct InitializerOptions {
     visit("feature_factor", self.feature_factor,
           OptionField{"", 1, 10, "Times the usual number of keypoints until the map is initialised."});
     visit("min_matches", self.min_matches,
-          OptionField{"", 20, 5000,
-                      "With fewer matches to the reference frame, the current frame takes its place."});
+          OptionField{"", 20, 5000, "A reference frame with fewer matches is given up."});
     visit("min_match_ratio", self.min_match_ratio,
+          OptionField{
+              "", 0, 1,
+              "A reference frame is given up below this part of the most matches that it had: those that "
+              "are left tell too little of which motion it was."});
+    visit("renewal_match_ratio", self.renewal_match_ratio,
           OptionField{"", 0, 1,
-                      "The same below this part of the most matches that the reference frame had: those that "
-                      "are left tell too little of which motion it was."});
+                      "Below this part of the most matches of the newest reference frame, the current frame "
+                      "becomes another one beside it."});
+    visit("max_references", self.max_references,
+          OptionField{"", 1, 10, "Reference frames from which a start is tried at a time."});
     visit("search_radius_px", self.search_radius_px,
           OptionField{"px", 5, 1000, "How far from its last place a keypoint is looked for."});
     visit("max_octave", self.max_octave,
