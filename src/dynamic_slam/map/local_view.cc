@@ -1,7 +1,7 @@
 #include "dynamic_slam/map/local_view.h"
 
 #include <algorithm>
-#include <bit>
+#include <cstddef>
 
 namespace dynamic_slam {
 namespace {
@@ -22,26 +22,6 @@ void FetchAhead(const Landmark* landmark) {
 }
 
 }  // namespace
-
-void LocalViewBuilder::CopiedSet::Begin(size_t most) {
-  ++build_;
-  if (entries_.size() >= 2 * most && !entries_.empty()) return;
-  entries_.assign(std::bit_ceil(std::max<size_t>(2 * most, 1024)), {});
-  shift_ = 32 - std::countr_zero(entries_.size());
-}
-
-bool LocalViewBuilder::CopiedSet::Add(LandmarkId id) {
-  const size_t mask = entries_.size() - 1;
-  // Fibonacci hashing (Knuth, The Art of Computer Programming 3, 6.4): ids that follow each other lie apart.
-  for (size_t at = (id.value() * 2654435769u) >> shift_;; at = (at + 1) & mask) {
-    Entry& entry = entries_[at];
-    if (entry.build != build_) {
-      entry = {id, build_};
-      return true;
-    }
-    if (entry.id == id) return false;
-  }
-}
 
 void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes,
                              LocalView* view) {
@@ -93,14 +73,26 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     }
   }
 
-  copied_.Begin(map.landmarks().size());
-  landmarks_.clear();
+  is_taken_.resize((map.landmarks().CreatedCount() + 63) / 64 + 1);
   for (const KeyframeId keyframe : keyframes_) {
-    for (const LandmarkId id : map.keyframes().At(keyframe).landmarks()) {
-      if (!id.IsValid() || !copied_.Add(id)) continue;
-      landmarks_.push_back(&map.landmarks().At(id));
-      view->ids.push_back(id);
+    const std::vector<LandmarkId>& landmarks = map.keyframes().At(keyframe).landmarks();
+    fresh_.resize(std::max(fresh_.size(), landmarks.size()));
+    size_t count = 0;
+    // Which keypoints have a landmark, and which landmark is new, is hard to predict: no branches.
+    for (const LandmarkId id : landmarks) {
+      const uint64_t is_valid = id.IsValid();
+      const uint32_t at = id.IsValid() ? id.value() : 0;
+      uint64_t& bits = is_taken_[at / 64];
+      fresh_[count] = id;
+      count += is_valid & ~(bits >> (at % 64));
+      bits |= is_valid << (at % 64);
     }
+    view->ids.insert(view->ids.end(), fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  landmarks_.clear();
+  for (const LandmarkId id : view->ids) {
+    is_taken_[id.value() / 64] = 0;
+    landmarks_.push_back(&map.landmarks().At(id));
   }
   for (size_t i = 0; i < landmarks_.size(); ++i) {
     if (i + kAhead < landmarks_.size()) FetchAhead(landmarks_[i + kAhead]);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -35,25 +36,10 @@ class LocalViewBuilder {
   void Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes, LocalView* view);
 
  private:
-  // The landmarks that a Build has copied: a hash table whose entries of earlier builds count as free. By id
-  // it would be as long as all landmarks that ever were.
-  class CopiedSet {
-   public:
-    void Begin(size_t most);  // ids that may be added
-    bool Add(LandmarkId id);  // false when it is there already
-
-   private:
-    struct Entry {
-      LandmarkId id;
-      uint32_t build = 0;
-    };
-    std::vector<Entry> entries_;  // a power of two of them
-    uint32_t build_ = 0;
-    int shift_ = 0;  // from a hash to its place
-  };
-
-  std::vector<int> votes_;  // by keyframe id
-  CopiedSet copied_;
+  // The landmarks that the view holds already: a bit for each that ever was, all 0 between builds.
+  std::vector<uint64_t> is_taken_;
+  std::vector<LandmarkId> fresh_;  // of one keyframe
+  std::vector<int> votes_;         // by keyframe id
   std::vector<KeyframeId> keyframes_;
   std::vector<const Landmark*> landmarks_;  // during Build
   std::vector<CovisibleKeyframe> neighbours_;
