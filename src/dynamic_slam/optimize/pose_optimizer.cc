@@ -230,8 +230,11 @@ bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
       continue;
     }
     const Rigid3 candidate = Rigid3(ExpSo3(step.head<3>()), step.tail<3>()) * *cam_from_world;
+    if (-step.dot(current.gradient) < kSmallDecrement) {
+      *cam_from_world = candidate;  // so small a step can do no harm: its cost is not worth asking for
+      break;
+    }
     Accumulate(active_, candidate, fx_, fy_, cx_, cy_, delta_squared, &next);
-    const double decrement = -step.dot(current.gradient);
     if (next.cost <= current.cost) {  // false for NaN
       *cam_from_world = candidate;
       current = next;
@@ -239,7 +242,6 @@ bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
     } else {
       damping = std::max(1e-4, 10 * damping);
     }
-    if (decrement < kSmallDecrement) break;
   }
   return true;
 }
