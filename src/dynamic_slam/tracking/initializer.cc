@@ -1,7 +1,6 @@
 #include "dynamic_slam/tracking/initializer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -62,7 +61,8 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
   return std::nullopt;
 }
 
-// Forgets the references of which too little is left.
+// Forgets the references of which too little is left; the reason given for it counts when that was the last
+// one.
 std::vector<std::vector<Match>> Initializer::MatchReferences(const Frame& frame) {
   std::vector<std::vector<Match>> matches;
   size_t kept = 0;
