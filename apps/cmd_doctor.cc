@@ -20,7 +20,7 @@
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/diagnosis/clip_advice.h"
 #include "dynamic_slam/diagnosis/clip_measures.h"
-#include "dynamic_slam/diagnosis/focal_check.h"
+#include "dynamic_slam/diagnosis/self_calibration.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/semantics/network_files.h"
@@ -115,21 +115,26 @@ void PrintClip(const DoctorArguments& arguments) {
                                 : fmt::format("a rotation alone explains {:.0f} % of the matches of {} pairs",
                                               100 * m.rotation_share, m.pairs));
   // A map needs images that can be used.
-  std::optional<FocalGuess> focal;
+  std::optional<SelfCalibration> calibration;
   if (camera.has_value() && AdviseOnClip(m).empty() && !source->IsLive()) {
     FrameSourceOptions few = arguments.source_options;
     constexpr int kImages = 300;
     few.max_frames = few.max_frames == 0 ? kImages : std::min(few.max_frames, kImages);
-    focal = GuessFocalLength(*camera, OpenFrameSource(arguments.source, few).get());
+    calibration = CalibrateByMap(*camera, OpenFrameSource(arguments.source, few).get());
   }
   Line("calibration", !camera.has_value() ? "no camera is given (--camera)"
-                      : !focal.has_value()
+                      : !calibration.has_value()
                           ? "not measured: it needs a map of the clip"
                           : fmt::format("with another focal length, errors of a map are {:.0f} % smaller",
-                                        100 * focal->gain));
+                                        100 * calibration->focal_gain));
+  if (calibration.has_value()) {
+    Line("shutter",
+         fmt::format("with readout_s: {:.3f} instead of {:.3f}, errors of a map are {:.0f} % smaller",
+                     calibration->readout_s, camera->readout_s, 100 * calibration->readout_gain));
+  }
   for (const SourceProblem& problem : source->Problems())
     Line("skipped", problem.name + ": " + problem.reason);
-  const std::vector<ClipAdvice> advice = AdviseOnClip(m, focal);
+  const std::vector<ClipAdvice> advice = AdviseOnClip(m, calibration);
   if (advice.empty()) Line("advice", "Nothing stands in the way of a run.");
   for (const ClipAdvice& one : advice) Line("advice", one.text);
 }

@@ -26,37 +26,40 @@ T Choose(const std::map<std::string, T>& choices, const std::string& name, const
 void BindCamera(py::module_& module) {
   py::class_<Camera>(module, "Camera",
                      "A camera with a lens of the model 'radial_tangential' or 'kannala_brandt'.")
-      .def(py::init([](int width, int height, double fx, double fy, double cx, double cy, double fps,
-                       const std::string& model, const std::vector<double>& distortion,
-                       const std::string& name) {
-             Camera camera{.name = name,
-                           .width = width,
-                           .height = height,
-                           .fps = fps,
-                           .fx = fx,
-                           .fy = fy,
-                           .cx = cx,
-                           .cy = cy};
-             camera.model = Choose<LensModel>({{"radial_tangential", LensModel::kRadialTangential},
-                                               {"kannala_brandt", LensModel::kKannalaBrandt}},
-                                              model, "model");
-             const bool is_fisheye = camera.model == LensModel::kKannalaBrandt;
-             double* const brown[] = {&camera.k1, &camera.k2, &camera.p1, &camera.p2, &camera.k3};
-             double* const fisheye[] = {&camera.k1, &camera.k2, &camera.k3, &camera.k4};
-             const size_t most = is_fisheye ? std::size(fisheye) : std::size(brown);
-             if (distortion.size() > most) {
-               throw py::value_error("distortion must have at most " + std::to_string(most) +
-                                     " numbers, not " + std::to_string(distortion.size()));
-             }
-             for (size_t i = 0; i < distortion.size(); ++i)
-               *(is_fisheye ? fisheye[i] : brown[i]) = distortion[i];
-             camera.Validate();
-             return camera;
-           }),
-           py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
-           py::kw_only(), py::arg("fps") = 0.0, py::arg("model") = "radial_tangential",
-           py::arg("distortion") = std::vector<double>(), py::arg("name") = "",
-           "All in px. distortion: k1 k2 p1 p2 k3, or k1 k2 k3 k4 of kannala_brandt, as in OpenCV.")
+      .def(
+          py::init([](int width, int height, double fx, double fy, double cx, double cy, double fps,
+                      const std::string& model, const std::vector<double>& distortion,
+                      const std::string& name, double readout_s) {
+            Camera camera{.name = name,
+                          .width = width,
+                          .height = height,
+                          .fps = fps,
+                          .fx = fx,
+                          .fy = fy,
+                          .cx = cx,
+                          .cy = cy};
+            camera.model = Choose<LensModel>({{"radial_tangential", LensModel::kRadialTangential},
+                                              {"kannala_brandt", LensModel::kKannalaBrandt}},
+                                             model, "model");
+            const bool is_fisheye = camera.model == LensModel::kKannalaBrandt;
+            double* const brown[] = {&camera.k1, &camera.k2, &camera.p1, &camera.p2, &camera.k3};
+            double* const fisheye[] = {&camera.k1, &camera.k2, &camera.k3, &camera.k4};
+            const size_t most = is_fisheye ? std::size(fisheye) : std::size(brown);
+            if (distortion.size() > most) {
+              throw py::value_error("distortion must have at most " + std::to_string(most) +
+                                    " numbers, not " + std::to_string(distortion.size()));
+            }
+            for (size_t i = 0; i < distortion.size(); ++i)
+              *(is_fisheye ? fisheye[i] : brown[i]) = distortion[i];
+            camera.readout_s = readout_s;
+            camera.Validate();
+            return camera;
+          }),
+          py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
+          py::kw_only(), py::arg("fps") = 0.0, py::arg("model") = "radial_tangential",
+          py::arg("distortion") = std::vector<double>(), py::arg("name") = "", py::arg("readout_s") = 0.0,
+          "All in px. distortion: k1 k2 p1 p2 k3, or k1 k2 k3 k4 of kannala_brandt, as in OpenCV. readout_s: "
+          "of a rolling shutter, from the first row to the last.")
       .def_readonly("name", &Camera::name)
       .def_readonly("width", &Camera::width, "px")
       .def_readonly("height", &Camera::height, "px")
@@ -65,6 +68,7 @@ void BindCamera(py::module_& module) {
       .def_readonly("fy", &Camera::fy, "px")
       .def_readonly("cx", &Camera::cx, "px")
       .def_readonly("cy", &Camera::cy, "px")
+      .def_readonly("readout_s", &Camera::readout_s, "Of a rolling shutter, s; 0: all rows at once.")
       .def("__repr__", [](const Camera& camera) {
         return "<Camera '" + camera.name + "' " + std::to_string(camera.width) + " x " +
                std::to_string(camera.height) + ">";

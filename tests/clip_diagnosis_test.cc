@@ -134,16 +134,17 @@ TEST_F(ClipDiagnosisTest, AWrongFocalLengthIsSeen) {
     camera.fy *= factor;
     Clip clip(kFrames, Image), again(kFrames, Image);
     const ClipMeasures measures = MeasureClip(camera, &clip);
-    const std::optional<FocalGuess> focal = GuessFocalLength(camera, &again);
-    ASSERT_TRUE(focal.has_value());
-    const std::vector<ClipAdvice> advice = AdviseOnClip(measures, focal);
+    const std::optional<SelfCalibration> found = CalibrateByMap(camera, &again);
+    ASSERT_TRUE(found.has_value());
+    const std::vector<ClipAdvice> advice = AdviseOnClip(measures, found);
     if (factor == 1) {
-      EXPECT_THAT(advice, ::testing::IsEmpty()) << focal->gain;
-      EXPECT_NEAR(focal->factor, 1, 0.02);
+      EXPECT_THAT(advice, ::testing::IsEmpty()) << found->focal_gain;
+      EXPECT_NEAR(found->focal_factor, 1, 0.02);
     } else {
-      ASSERT_FALSE(advice.empty()) << factor << ": gain " << focal->gain << " factor " << focal->factor;
+      ASSERT_FALSE(advice.empty()) << factor << ": gain " << found->focal_gain << " factor "
+                                   << found->focal_factor;
       EXPECT_EQ(advice.front().problem, ClipProblem::kCalibration);
-      EXPECT_EQ(focal->factor > 1, factor < 1);
+      EXPECT_EQ(found->focal_factor > 1, factor < 1);
     }
   }
 }

@@ -6,12 +6,14 @@
 
 namespace dynamic_slam {
 
-std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m, const std::optional<FocalGuess>& focal) {
+std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m,
+                                     const std::optional<SelfCalibration>& calibration) {
   constexpr double kDarkGrey = 25, kBlackShare = 0.7, kWhiteShare = 0.3;
   constexpr double kBlurredPx = 4, kFewKeypoints = 0.4;
   constexpr double kStill = 0.003, kRotation = 0.9;
   // A map keeps what fits its camera: of a focal length that is a third off, this much is left to see.
   constexpr double kFocalGain = 0.03, kFocalChange = 0.04;
+  constexpr double kReadoutGain = 0.03;
   std::vector<ClipAdvice> advice;
   const auto advise = [&advice](ClipProblem problem, std::string text) {
     advice.push_back({problem, std::move(text)});
@@ -63,7 +65,8 @@ std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m, const std::optional<
                        "be seen. Walk "
                        "with it; move it sideways while it looks at things that are near.",
                        100 * m.rotation_share));
-  } else if (focal.has_value() && focal->gain > kFocalGain && std::abs(focal->factor - 1) > kFocalChange) {
+  } else if (calibration.has_value() && calibration->focal_gain > kFocalGain &&
+             std::abs(calibration->focal_factor - 1) > kFocalChange) {
     advise(
         ClipProblem::kCalibration,
         fmt::format(
@@ -71,7 +74,13 @@ std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m, const std::optional<
             "{:.0f} % "
             "smaller. Check the camera file and the size of the images; `dynamic_slam calibrate` makes a new "
             "one.",
-            focal->factor > 1 ? "longer" : "shorter", 100 * focal->gain));
+            calibration->focal_factor > 1 ? "longer" : "shorter", 100 * calibration->focal_gain));
+  } else if (calibration.has_value() && calibration->readout_gain > kReadoutGain) {
+    advise(
+        ClipProblem::kRollingShutter,
+        fmt::format("The shutter seems to roll: with readout_s: {:.3f} in the camera file, errors of the map "
+                    "are {:.0f} % smaller.",
+                    calibration->readout_s, 100 * calibration->readout_gain));
   }
   return advice;
 }

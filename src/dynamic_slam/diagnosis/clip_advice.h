@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dynamic_slam/diagnosis/clip_measures.h"
-#include "dynamic_slam/diagnosis/focal_check.h"
+#include "dynamic_slam/diagnosis/self_calibration.h"
 
 namespace dynamic_slam {
 
@@ -16,7 +16,8 @@ enum class ClipProblem {
   kLittleTexture,
   kNoMotion,
   kOnlyRotation,
-  kCalibration
+  kCalibration,
+  kRollingShutter
 };
 
 struct ClipAdvice {
@@ -24,9 +25,9 @@ struct ClipAdvice {
   std::string text;  // what is seen, with its number, and what to do
 };
 
-// What stands in the way of SLAM, the worst first: what hides the rest comes before it. Empty when nothing does.
-// focal: of a map of the clip, if there is one.
+// What stands in the way of SLAM, the worst first: what hides the rest comes before it. Empty when nothing
+// does. calibration: by a map of the clip, if there is one.
 std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& measures,
-                                     const std::optional<FocalGuess>& focal = {});
+                                     const std::optional<SelfCalibration>& calibration = {});
 
 }  // namespace dynamic_slam

@@ -165,6 +165,8 @@ void Camera::Validate() const {
   require(std::isfinite(cx) && cx > 0 && cx < width, fmt::format("cx must lie in the image, is {}", cx));
   require(std::isfinite(cy) && cy > 0 && cy < height, fmt::format("cy must lie in the image, is {}", cy));
   require(std::isfinite(fps) && fps >= 0, fmt::format("fps must not be negative, is {}", fps));
+  require(readout_s >= 0 && readout_s <= kMaxReadout_s,
+          fmt::format("readout_s must be from 0 to {}, is {}", kMaxReadout_s, readout_s));
   require(!(fps > kMaxFps), fmt::format("fps must be at most {}, is {}", kMaxFps, fps));
   bool finite = true;
   for (const double k : {k1, k2, p1, p2, k3, k4}) finite = finite && std::isfinite(k);

@@ -31,6 +31,7 @@ struct DYNAMIC_SLAM_API Camera {
   static constexpr int kMinSizePx = 16, kMaxSizePx = 100000;
   static constexpr double kMinFocalPx = 1e-3, kMaxFocalPx = 1e6;
   static constexpr double kMaxFps = 1e5;
+  static constexpr double kMaxReadout_s = 1;
 
   // Rays of a fisheye farther from the optical axis are not used: in the ideal image the noise of a pixel
   // grows along the radius with 1 / cos^2, 4 times at 60 deg.
@@ -45,6 +46,8 @@ struct DYNAMIC_SLAM_API Camera {
   LensModel model = LensModel::kRadialTangential;
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0,
          k4 = 0;  // p: radial-tangential only, k4: Kannala-Brandt only
+  // From the exposure of the first row to that of the last (rolling shutter); 0: all at once.
+  double readout_s = 0;
 
   // Whether ideal pixels differ from raw ones.
   bool HasDistortion() const {

@@ -37,6 +37,9 @@ struct CameraFields {
     visit("cx", c.cx,
           OptionField{"px", 0, kMaxPx, "Principal point; (0, 0) is the centre of the top left pixel."});
     visit("cy", c.cy, OptionField{"px", 0, kMaxPx, ""});
+    visit("readout_s", c.readout_s,
+          OptionField{"s", 0, Camera::kMaxReadout_s,
+                      "Rolling shutter: from the first row to the last; 0: all rows at once."});
     const bool is_fisheye = c.model == LensModel::kKannalaBrandt;
     visit("k1", c.k1,
           OptionField{"", 0, 0,

@@ -81,6 +81,7 @@ Camera PreparedCamera(const Camera& raw, const cv::Rect& crop, int resize_width)
   camera.cy -= crop.y;
   camera.width = crop.width;
   camera.height = crop.height;
+  camera.readout_s *= static_cast<double>(crop.height) / raw.height;
   if (resize_width == 0 || resize_width == crop.width) return camera;
   camera.width = resize_width;
   camera.height = static_cast<int>(std::lround(static_cast<double>(crop.height) * resize_width / crop.width));

@@ -14,6 +14,9 @@ struct Frame {
   FrameId id;
   double timestamp_s = 0;
   FeatureSet features;
+  // Where a rolling shutter read each keypoint, ideal px; in `features` they are where the middle row's time
+  // has them, as far as the camera's motion is known. Empty: the same.
+  std::vector<Eigen::Vector2f> read_px;
   KeypointGrid grid;
   std::vector<LandmarkId> landmarks;     // of each keypoint; not valid where there is none
   std::vector<Eigen::Vector3d> points;   // where that landmark was in the world when it was matched
@@ -28,6 +31,11 @@ struct Frame {
   // Outlives changes of the map, which cam_from_world does not; lengths are in the reference's unit.
   Rigid3 cam_from_reference;
   double reference_unit = 1;  // Keyframe::unit of the reference, when the pose was found
+
+  Eigen::Vector2d ReadPx(size_t keypoint) const {
+    const Keypoint& k = features.keypoints[keypoint];
+    return read_px.empty() ? Eigen::Vector2d(k.x, k.y) : read_px[keypoint].cast<double>();
+  }
 
   float StaticProbability(size_t keypoint) const {  // 1 where nothing was said
     return static_probability.empty() ? 1.0f : static_probability[keypoint];

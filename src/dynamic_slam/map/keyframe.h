@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "dynamic_slam/base/ids.h"
@@ -61,6 +62,10 @@ class Keyframe {
   int LandmarkCount() const { return landmark_count_; }
 
   const std::vector<float>& static_probability() const { return static_probability_; }
+  // When more is known of what moved. What was written into the place index stays.
+  void set_static_probability(std::vector<float> probability) {
+    static_probability_ = std::move(probability);
+  }
 
   // Keyframes that share landmarks, by id.
   const std::vector<CovisibleKeyframe>& covisible() const { return covisible_; }

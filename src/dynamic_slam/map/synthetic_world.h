@@ -6,6 +6,7 @@
 
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/geometry/rolling_shutter.h"
 #include "dynamic_slam/geometry/two_view_scene.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
@@ -41,8 +42,9 @@ class SyntheticWorld {
     return scales;
   }
 
-  // Keypoints are noisy, and a few bits of their descriptors differ from view to view.
-  SyntheticView See(const Rigid3& cam_from_world) {
+  // Keypoints are noisy, and a few bits of their descriptors differ from view to view. A rolling shutter
+  // (SetReadout) sees the motion: to first order, which is enough where views move by little.
+  SyntheticView See(const Rigid3& cam_from_world, const SteadyMotion& motion = {}) {
     SyntheticView view;
     view.frame.id = FrameId(frames_);
     view.frame.timestamp_s = frames_++;
@@ -53,8 +55,9 @@ class SyntheticWorld {
       const double octave = std::log(max_distances_[i] / x_in_cam.norm()) / std::log(1.2);
       Keypoint keypoint;
       keypoint.octave = std::clamp(static_cast<int>(std::lround(octave)), 0, kOctaves - 1);
+      const double row_s = (camera_.Project(x_in_cam).y() / (camera_.height - 1) - 0.5) * camera_.readout_s;
       const Eigen::Vector2d px =
-          camera_.Project(x_in_cam) +
+          camera_.Project(x_in_cam + row_s * (motion.angular_rad_s.cross(x_in_cam) + motion.linear_per_s)) +
           Noise(noise_px_ * OctaveScales()[static_cast<size_t>(keypoint.octave)], random_);
       keypoint.x = keypoint.raw_x = static_cast<float>(px.x());
       keypoint.y = keypoint.raw_y = static_cast<float>(px.y());
@@ -76,6 +79,8 @@ class SyntheticWorld {
       descriptors_[i] = {random_.Next(), random_.Next(), random_.Next(), random_.Next()};
     }
   }
+
+  void SetReadout(double readout_s) { camera_.readout_s = readout_s; }
 
   const Camera& camera() const { return camera_; }
   const Eigen::Vector3d& position(uint32_t point) const { return positions_[point]; }

@@ -37,6 +37,12 @@ struct CompensatedBox {
   int missed_frames = 0;     // since the detector last saw it
 };
 
+// The boxes of one frame.
+struct FrameBoxes {
+  FrameId frame;
+  std::vector<CompensatedBox> boxes;
+};
+
 // Fills in the boxes that a detector misses, from those of earlier frames (section 3.1).
 class BoxCompensation {
  public:
@@ -55,6 +61,9 @@ class BoxCompensation {
 
   // The boxes in the last frame as they are believed to be now, in the order of track ids.
   virtual std::vector<CompensatedBox> Boxes() const = 0;
+
+  // The same of the frames from `first` to the one before the last, as far as they are remembered.
+  virtual std::vector<FrameBoxes> EarlierBoxes(FrameId first) const = 0;
 
   // Forgets all boxes and frames; ids of tracks go on.
   virtual void Reset() = 0;

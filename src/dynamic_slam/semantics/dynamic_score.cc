@@ -54,15 +54,23 @@ std::vector<DynamicBox> DynamicScore::Update(std::span<const CompensatedBox> box
       track.last_detection = detection;
     }
     track.last_frame = frame_;
-
-    double score = 0;
-    for (size_t i = 0; i < class_scores_.size(); ++i) score += track.belief[i] * class_scores_[i];
-    result.push_back({{box}, score / DynamicPrior::kMaxScore, score, score > options_.threshold});  // Eq. (8)
+    result.push_back(Judge(box, track));
   }
   std::erase_if(tracks_, [this](const auto& item) {
     return frame_ - item.second.last_frame >= static_cast<int>(BoxCompensation::kHistoryFrames);
   });
   return result;
+}
+
+DynamicBox DynamicScore::Judge(const CompensatedBox& box, const Track& track) const {
+  double score = 0;
+  for (size_t i = 0; i < class_scores_.size(); ++i) score += track.belief[i] * class_scores_[i];
+  return {{box}, score / DynamicPrior::kMaxScore, score, score > options_.threshold};
+}
+
+DynamicBox DynamicScore::Judge(const CompensatedBox& box) const {
+  const auto known = tracks_.find(box.track_id);
+  return Judge(box, known != tracks_.end() ? known->second : Begin(box.class_id));
 }
 
 void DynamicScore::Reset() { tracks_.clear(); }

@@ -67,6 +67,9 @@ class DynamicScore {
   // remembered for BoxCompensation::kHistoryFrames, as a late result may bring it back, and forgotten then.
   std::vector<DynamicBox> Update(std::span<const CompensatedBox> boxes);
 
+  // A box of an earlier frame, by what is known of its track now.
+  DynamicBox Judge(const CompensatedBox& box) const;
+
   // Forgets all tracks.
   void Reset();
 
@@ -81,6 +84,7 @@ class DynamicScore {
   };
 
   Track Begin(int class_id) const;
+  DynamicBox Judge(const CompensatedBox& box, const Track& track) const;        // Eq. (8)
   void Predict(std::vector<double>* belief) const;                              // Eq. (9)
   void Measure(int class_id, double trust, std::vector<double>* belief) const;  // Eq. (7)
 

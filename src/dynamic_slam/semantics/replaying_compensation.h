@@ -43,6 +43,15 @@ class ReplayingCompensation : public BoxCompensation {
 
   std::vector<CompensatedBox> Boxes() const final { return BoxesOf(state_); }
 
+  std::vector<FrameBoxes> EarlierBoxes(FrameId first) const final {
+    std::vector<FrameBoxes> earlier;
+    for (size_t i = 0; i + 1 < history_.size(); ++i) {
+      if (history_[i].input.frame < first) continue;
+      earlier.push_back({history_[i].input.frame, BoxesOf(history_[i + 1].before)});
+    }
+    return earlier;
+  }
+
   void Reset() final {
     history_.clear();
     state_ = State();

@@ -23,8 +23,8 @@ void Write(Random& random, const cv::Rect& area, double letter, const cv::Scalar
         text += ' ';
         continue;
       }
-      const char letter = static_cast<char>('A' + random.Index(26));
-      text += random.Index(4) == 0 ? letter : static_cast<char>(letter + 32);
+      const char capital = static_cast<char>('A' + random.Index(26));
+      text += random.Index(4) == 0 ? capital : static_cast<char>(capital + 32);
     }
     cv::putText(sheet, text, {0, cvRound(y)}, cv::FONT_HERSHEY_SIMPLEX, letter / 22.0, ink,
                 std::max(1, cvRound(letter / 8)), cv::LINE_AA);

@@ -30,8 +30,8 @@ struct DetectionOptions {
                       "Answers are kept back until the stamps are so much later: a simulated slow network."});
     visit("first_answer_s", self.first_answer_s,
           OptionField{"s", 0, 600,
-                      "No map is started before the detector has answered once, for so long at most: a start "
-                      "that cannot know who moves is often a wrong one."});
+                      "No map is started from a view before the detector has told who moves in it, for so "
+                      "long at most: a start that does not know is often a wrong one."});
     visit("compensation", self.compensation);
     visit("prior", self.prior,
           OptionField{"", 0, 0, "File, or name of one in the configuration, with the scores of classes."});

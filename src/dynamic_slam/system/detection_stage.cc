@@ -14,22 +14,6 @@ using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
-const char* Name(DetectionState state) {
-  switch (state) {
-    case DetectionState::kOff:
-      return "off";
-    case DetectionState::kOnTime:
-      return "on time";
-    case DetectionState::kNotAsked:
-      return "not asked";
-    case DetectionState::kLate:
-      return "late";
-    case DetectionState::kFailed:
-      return "failed";
-  }
-  return "";
-}
-
 DetectionStage::DetectionStage(std::shared_ptr<Detector> detector, const DetectionOptions& options,
                                const Camera& camera, Executor* executor)
     : detector_(std::move(detector)),
@@ -41,16 +25,17 @@ DetectionStage::DetectionStage(std::shared_ptr<Detector> detector, const Detecti
 
 bool DetectionStage::Begin(FrameId frame, double timestamp_s) {
   failure_.clear();
+  told_late_ = FrameId();
   if (const std::optional<DetectionResult> answer = TakeAnswer(timestamp_s, 0)) {
     ++report_.late;
-    compensation_->UpdateLate(answer->frame, answer->detections);
+    if (compensation_->UpdateLate(answer->frame, answer->detections)) told_late_ = answer->frame;
   }
   return !open_.has_value() && frame.value() % static_cast<uint32_t>(options_.every) == 0;
 }
 
 void DetectionStage::Submit(FrameId frame, double timestamp_s, const cv::Mat& image) {
   DS_CHECK(!open_.has_value(), "frame={} open={}", frame.value(), open_->frame.value());
-  open_ = {frame, timestamp_s + 1e-3 * options_.latency_ms};
+  open_ = {frame, timestamp_s, timestamp_s + 1e-3 * options_.latency_ms};
   ++report_.asked;
   // The task owns all that it touches: a network that hangs may outlive the system.
   executor_->Post(Lane::kDetection, [detector = detector_, shared = shared_, frame, timestamp_s,
@@ -112,14 +97,27 @@ FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
     objects.reason = failure_;
   }
   objects.boxes = score_.Update(compensation_->Update(input));
-  objects.is_awaited = IsFirstAnswerAwaited(timestamp_s);
+  objects.untold_from = UntoldFrom(timestamp_s);
+  if (told_late_.IsValid()) objects.late = NewlyTold(told_late_);
   return objects;
 }
 
-bool DetectionStage::IsFirstAnswerAwaited(double timestamp_s) {
-  if (!first_stamp_s_.has_value()) first_stamp_s_ = timestamp_s;
-  const bool has_answered = report_.on_time + report_.late + report_.failed > 0;
-  return !has_answered && timestamp_s - *first_stamp_s_ < options_.first_answer_s;
+FrameId DetectionStage::UntoldFrom(double timestamp_s) const {
+  const bool is_awaited = open_.has_value() && timestamp_s - open_->asked_s < options_.first_answer_s;
+  return is_awaited ? open_->frame : FrameId();
+}
+
+std::vector<LateObjects> DetectionStage::NewlyTold(FrameId told) const {
+  std::vector<LateObjects> late;
+  for (const FrameBoxes& earlier : compensation_->EarlierBoxes(told)) {
+    LateObjects& objects = late.emplace_back(earlier.frame, std::vector<DynamicBox>());
+    for (const CompensatedBox& box : earlier.boxes) {
+      const bool is_new = box.age_frames == static_cast<int>(earlier.frame.value() - told.value()) + 1;
+      if (is_new) objects.boxes.push_back(score_.Judge(box));
+    }
+    if (objects.boxes.empty()) late.pop_back();
+  }
+  return late;
 }
 
 void DetectionStage::SetRotation(FrameId frame, const Eigen::Quaterniond& cam_from_last) {
@@ -133,7 +131,7 @@ void DetectionStage::Reset() {
   open_.reset();
   answer_.reset();
   failure_.clear();
-  first_stamp_s_.reset();
+  told_late_ = FrameId();
   report_ = DetectionReport();
 }
 

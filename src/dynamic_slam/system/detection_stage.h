@@ -15,28 +15,11 @@
 #include "dynamic_slam/semantics/detection_exchange.h"
 #include "dynamic_slam/semantics/detector.h"
 #include "dynamic_slam/semantics/dynamic_score.h"
+#include "dynamic_slam/semantics/frame_objects.h"
 #include "dynamic_slam/system/detection_options.h"
 #include "dynamic_slam/system/executor.h"
 
 namespace dynamic_slam {
-
-enum class DetectionState : uint8_t {
-  kOff,       // there is no detector
-  kOnTime,    // the boxes are those of this frame
-  kNotAsked,  // this frame is not every n-th, or the detector is busy with an earlier one
-  kLate,      // the detector was asked about this frame, and has not answered yet
-  kFailed,    // it answered that it cannot
-};
-
-const char* Name(DetectionState state);
-
-// The objects in a frame, as far as they are known when tracking needs them.
-struct FrameObjects {
-  DetectionState state = DetectionState::kOff;
-  std::string reason;  // of a failure
-  std::vector<DynamicBox> boxes;
-  bool is_awaited = false;  // the detector has not answered even once, and it is not too late to hope for it
-};
 
 // What the detector has done so far.
 struct DetectionReport {
@@ -79,6 +62,7 @@ class DetectionStage {
  private:
   struct Question {
     FrameId frame;
+    double asked_s;
     double answer_due_s;  // not used before this stamp: a simulated slow network
   };
   // What the task in the detector's lane writes; it may outlive the stage.
@@ -91,7 +75,11 @@ class DetectionStage {
   // answer.
   std::optional<DetectionResult> TakeAnswer(double timestamp_s, double patience_ms);
 
-  bool IsFirstAnswerAwaited(double timestamp_s);
+  // FrameObjects::untold_from, of a frame with this stamp.
+  FrameId UntoldFrom(double timestamp_s) const;
+
+  // The objects that the answer about `told` brought, in that frame and those since but the last.
+  std::vector<LateObjects> NewlyTold(FrameId told) const;
 
   std::shared_ptr<Detector> detector_;
   DetectionOptions options_;
@@ -102,7 +90,7 @@ class DetectionStage {
   std::optional<Question> open_;
   std::optional<DetectionResult> answer_;  // that came before it was due
   std::string failure_;                    // of an answer taken in this frame
-  std::optional<double> first_stamp_s_;
+  FrameId told_late_;                      // of the answer taken in this frame, when it came late
   DetectionReport report_;
 };
 

@@ -98,23 +98,53 @@ TEST_F(DetectionStageTest, BetweenTheFramesThatAreAskedAboutBoxesAreCompensated)
   EXPECT_EQ(stage_->report().asked, 10);
 }
 
-TEST_F(DetectionStageTest, TheFirstAnswerIsAwaitedForALimitedTime) {
+TEST_F(DetectionStageTest, WhatIsUntoldIsAwaitedForALimitedTime) {
   DetectionOptions options;
   options.latency_ms = 90;
   Make([](FrameId frame) { return std::vector<Detection>{Walker(frame)}; }, options);
-  for (uint32_t i = 0; i < 10; ++i) EXPECT_EQ(Process(i).is_awaited, i < 3) << i;
+  for (uint32_t i = 0; i < 10; ++i) {
+    const FrameObjects objects = Process(i);
+    EXPECT_EQ(objects.untold_from, FrameId(i / 3 * 3)) << "asked about every third frame: " << i;
+  }
   stage_->Reset();
-  EXPECT_TRUE(Process(0).is_awaited);
+  EXPECT_EQ(Process(0).untold_from, FrameId(0));
 
   options.latency_ms = 60000;
   options.first_answer_s = 0.5;
   Make([](FrameId) { return std::vector<Detection>{}; }, options);
-  for (uint32_t i = 0; i < 30; ++i) EXPECT_EQ(Process(i).is_awaited, i < 0.5 * kFps) << i;
+  for (uint32_t i = 0; i < 30; ++i) EXPECT_EQ(Process(i).untold_from.IsValid(), i < 0.5 * kFps) << i;
 }
 
 TEST_F(DetectionStageTest, AFailureIsAnAnswer) {
   Make([](FrameId) -> std::vector<Detection> { throw std::runtime_error("no memory"); });
-  EXPECT_FALSE(Process(0).is_awaited);
+  EXPECT_FALSE(Process(0).untold_from.IsValid());
+}
+
+TEST_F(DetectionStageTest, ALateAnswerTellsOnceOfTheFramesBefore) {
+  DetectionOptions options;
+  options.latency_ms = 90;
+  // The walker is there all the time, and a second person from frame 6 on.
+  Make(
+      [](FrameId frame) {
+        std::vector<Detection> seen{Walker(frame)};
+        if (frame.value() >= 6) seen.push_back({{450, 100, 80, 200}, 0, 0.9});
+        return seen;
+      },
+      options);
+  for (uint32_t i = 0; i < 30; ++i) {
+    const FrameObjects objects = Process(i);
+    if (i != 3 && i != 9) {
+      EXPECT_THAT(objects.late, IsEmpty()) << i;
+      continue;
+    }
+    ASSERT_EQ(objects.late.size(), 3u) << i;
+    for (uint32_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(objects.late[k].frame, FrameId(i - 3 + k));
+      ASSERT_EQ(objects.late[k].boxes.size(), 1u) << "only whom nobody knew of";
+      EXPECT_TRUE(objects.late[k].boxes[0].is_dynamic);
+      EXPECT_NEAR(objects.late[k].boxes[0].box.x, i == 3 ? 100 : 450, 10);
+    }
+  }
 }
 
 TEST_F(DetectionStageTest, ASlowNetworkIsLateAndStillOfUse) {

@@ -102,8 +102,7 @@ FrameResult SlamSystem::ProcessPrepared(double timestamp_s, const cv::Mat& image
     result.objects =
         detection_->Collect(result.id, timestamp_s, tracker_.PredictedRotation(), tracker_.Motions());
   }
-  result.tracking =
-      tracker_.Track(result.objects.boxes, executor_->Waiting(Lane::kMapping), result.objects.is_awaited);
+  result.tracking = tracker_.Track(result.objects, executor_->Waiting(Lane::kMapping));
   if (const auto rotation = tracker_.Rotation(); rotation.has_value() && detection_.has_value()) {
     detection_->SetRotation(result.id, *rotation);
   }
@@ -144,7 +143,9 @@ void SlamSystem::Remember(const FrameResult& result) {
   const Frame& frame = tracker_.frame();
   if (tracking.part_was_erased) {
     const auto map = map_.Read();
-    const auto is_gone = [&](const TrackedFrame& frame) { return !map->PartOf(frame.reference).IsValid(); };
+    const auto is_gone = [&](const TrackedFrame& tracked) {
+      return !map->PartOf(tracked.reference).IsValid();
+    };
     std::erase_if(tracked_, is_gone);
     if (backfiller_.has_value()) backfiller_->PartWasErased();
   }

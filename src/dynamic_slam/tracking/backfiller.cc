@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/tracking/shutter_correction.h"
 
 namespace dynamic_slam {
 namespace {
@@ -40,7 +41,8 @@ Eigen::Vector3d CentreOf(const AnchoredPose& pose, const Map& map) {
 }  // namespace
 
 Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map)
-    : options_(options),
+    : camera_(camera),
+      options_(options),
       map_(map),
       bounds_(camera.IdealBounds()),
       localiser_(camera, options, map->Read()->octave_scales(), map),
@@ -50,6 +52,10 @@ Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint
 void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
   kept_.push_back(
       {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
+  // As they were read: the motion that was expected then is not that of the pose.
+  std::vector<Keypoint>& keypoints = kept_.back().features.keypoints;
+  for (size_t i = 0; i < frame.read_px.size(); ++i)
+    keypoints[i].x = frame.read_px[i].x(), keypoints[i].y = frame.read_px[i].y();
   keypoints_ += frame.features.size();
   while (keypoints_ > kMaxKeypoints) {
     keypoints_ -= kept_.front().features.size();
@@ -98,6 +104,27 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
   return found;
 }
 
+void Backfiller::CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const {
+  if (!(camera_.readout_s > 0)) return;
+  const auto next = known.upper_bound(frame->timestamp_s);
+  const AnchoredPose* nearest = next == known.end() ? nullptr : &next->second;
+  if (next != known.begin()) {
+    const AnchoredPose& before = std::prev(next)->second;
+    if (nearest == nullptr ||
+        frame->timestamp_s - before.timestamp_s < nearest->timestamp_s - frame->timestamp_s)
+      nearest = &before;
+  }
+  if (nearest == nullptr || std::abs(frame->timestamp_s - nearest->timestamp_s) > max_gap_s_) return;
+  const auto map = map_->Read();
+  if (map->PartOf(nearest->reference) != map->PartOf(guess.keyframe)) return;
+  const Rigid3 other = map->PoseFromReference(nearest->reference, nearest->cam_from_reference);
+  const SteadyMotion motion =
+      MotionBetween(guess.cam_from_world * other.Inverse(), frame->timestamp_s - nearest->timestamp_s);
+  const double depth = map->MedianDepth(guess.keyframe);
+  CorrectShutter(camera_, motion, depth > 0 ? 1 / depth : 0, frame);
+  frame->grid.Build(frame->features, bounds_);
+}
+
 std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* kept) {
   const auto next = known.upper_bound(kept->timestamp_s);
   constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -113,14 +140,19 @@ std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* 
   frame.features = kept->features;
   frame.static_probability = kept->static_probability;
   frame.grid.Build(frame.features, bounds_);
+  frame.ClearLandmarks();
+  if (camera_.readout_s > 0) RememberReadPlaces(&frame);
   const auto is_plausible = [&] {
     localiser_.Anchor(&frame);
     return IsPlausible(known, {frame.timestamp_s, frame.reference, frame.cam_from_reference});
   };
   const auto fits = [&](const Guess& guess, double search) {
-    return localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
-                                &frame) >= options_.min_motion_inliers &&
-           localiser_.TrackLocalMap(options_.local_map_radius_px, &frame) >= kept->min_inliers &&
+    CorrectShutterAt(known, guess, &frame);
+    if (localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
+                             &frame) < options_.min_motion_inliers)
+      return false;
+    CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
+    return localiser_.TrackLocalMap(options_.local_map_radius_px, &frame) >= kept->min_inliers &&
            is_plausible();
   };
   bool is_found = false;

@@ -62,6 +62,8 @@ class Backfiller {
   void LearnMotion(const Known& known);
   // Whether the camera can have come there from the pose before, and from there to the pose after.
   bool IsPlausible(const Known& known, const AnchoredPose& pose) const;
+  // A rolling shutter: moves the keypoints by how the camera came here from the nearest pose that is known.
+  void CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const;
   std::optional<AnchoredPose> FindPose(const Known& known, KeptFrame* kept);
   std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
   // Adds where the camera is at the stamp if it went on as between the two poses, and where it was at the
@@ -69,6 +71,7 @@ class Backfiller {
   void Extrapolate(const AnchoredPose& nearer, const AnchoredPose* farther, double timestamp_s,
                    const Map& map, std::vector<Guess>* guesses) const;
 
+  Camera camera_;
   TrackerOptions options_;
   SharedMap* map_;
   std::array<double, 4> bounds_;

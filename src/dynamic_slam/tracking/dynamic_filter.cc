@@ -147,11 +147,10 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   in_box_.assign(n, 0);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
-    const double at_rest = AtRestByBoxes(frame->features.keypoints[i], weights, &is_inside);
+    const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &is_inside);
     in_box_[i] = is_inside ? 1 : 0;
     if (weights) {
-      // However many boxes overlap, motion can still overrule them.
-      prior_[i] = static_cast<float>(std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object));
+      prior_[i] = Prior(at_rest);
       if (const uint32_t from = flow.last_keypoints()[i]; options_.motion && from != KeypointFlow::kNone) {
         frame->motion_log_odds[i] = last.motion_log_odds[from];
       }
@@ -169,13 +168,37 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   return counts;
 }
 
+float DynamicFilter::Prior(double at_rest) const {
+  return static_cast<float>(std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object));
+}
+
+void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSet& features,
+                              std::vector<float>* static_probability) const {
+  if (options_.method == "none") return;
+  std::vector<Object> objects;
+  for (const DynamicBox& box : boxes) {
+    if (box.is_dynamic) objects.push_back({.box = box, .moves = std::min(box.probability, kMostProbability)});
+  }
+  if (objects.empty()) return;
+  static_probability->resize(features.size(), 1.0f);
+  for (size_t i = 0; i < features.size(); ++i) {
+    bool is_inside = false;
+    const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &is_inside);
+    if (!is_inside) continue;
+    float& p = (*static_probability)[i];
+    p = options_.method == "weights" ? std::min(p, Prior(at_rest)) : 0;
+  }
+}
+
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other.
-double DynamicFilter::AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const {
+double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
+                                    bool* in_box) const {
+  const bool with_margin = options_.method == "weights";
   const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
-  for (const Object& object : objects_) {
+  for (const Object& object : objects) {
     if (!object.IsMoving()) continue;
     const Box& b = object.box.box;
     const double margin_px = with_margin ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;

@@ -33,6 +33,10 @@ class DynamicFilter {
   DynamicKeypoints Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow, const Frame& last,
                          Frame* frame);
 
+  // Lowers the P(at rest) of an earlier frame's keypoints that are in boxes which nobody knew of then.
+  void JudgeLate(std::span<const DynamicBox> boxes, const FeatureSet& features,
+                 std::vector<float>* static_probability) const;
+
   // When the pose is known: which keypoints in and around boxes moved as what is at rest does, and which as
   // the object. Changes frame->static_probability.
   void Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame);
@@ -89,7 +93,9 @@ class DynamicFilter {
   float Combine(float prior, float motion_log_odds) const;
   // How the keypoint moved tells so much more of whether it is at rest.
   void AddEvidence(float log_odds, size_t keypoint, Frame* frame) const;
-  double AtRestByBoxes(const Keypoint& keypoint, bool with_margin, bool* in_box) const;
+  double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, bool* in_box) const;
+  // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
+  float Prior(double at_rest) const;
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
   template <class Rest>

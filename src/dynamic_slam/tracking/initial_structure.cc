@@ -21,8 +21,56 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 // Too few sightings say nothing of a view's pose.
 constexpr int kMinSightings = 20;
 
-BundleProblem::Observation MakeObservation(uint32_t pose, uint32_t point, const Sighting& sighting) {
-  return {pose, point, sighting.ideal_px, 1.0 / sighting.sigma_px, 1.0};
+// A bundle of views, and which sighting each of its observations is.
+struct ViewsProblem {
+  BundleProblem bundle;
+  std::vector<const Sighting*> sightings;
+
+  void Observe(uint32_t pose, uint32_t point, const Sighting& sighting) {
+    bundle.observations.push_back({pose, point, sighting.ideal_px, 1.0 / sighting.sigma_px, 1.0});
+    sightings.push_back(&sighting);
+  }
+};
+
+// The motions of the views, in the order of time, from their neighbours' poses.
+std::vector<SteadyMotion> MotionsOf(const std::vector<Rigid3>& poses, const std::vector<double>& stamps_s) {
+  std::vector<SteadyMotion> between, motions;
+  for (size_t i = 0; i + 1 < poses.size(); ++i)
+    between.push_back(MotionBetween(poses[i + 1] * poses[i].Inverse(), stamps_s[i + 1] - stamps_s[i]));
+  for (size_t i = 0; i < poses.size(); ++i)
+    motions.push_back(Mean(between[i > 0 ? i - 1 : 0], between[std::min(i, between.size() - 1)]));
+  return motions;
+}
+
+// Moves what the views saw to the time of their middle rows, by the motions that their poses tell.
+void CorrectShutters(const Camera& camera, const InitialViews& views, const std::vector<uint8_t>& has_pose,
+                     ViewsProblem* problem, InitialStructure* structure) {
+  BundleProblem& bundle = problem->bundle;
+  std::vector<uint32_t> in_time{0};  // the problem has those between backwards, after the outer two
+  std::vector<double> stamps_s{views.reference_timestamp_s};
+  for (uint32_t v = 0; v < views.between.size(); ++v) {
+    if (has_pose[v] == 0) continue;
+    in_time.push_back(static_cast<uint32_t>(1 + views.between.size()) - v);
+    stamps_s.push_back(views.between[v].timestamp_s);
+  }
+  in_time.push_back(1);
+  stamps_s.push_back(views.last.timestamp_s);
+  std::vector<Rigid3> poses;
+  for (const uint32_t pose : in_time) poses.push_back(bundle.poses[pose].cam_from_world);
+  const std::vector<SteadyMotion> motions = MotionsOf(poses, stamps_s);
+  std::vector<const SteadyMotion*> motion_of(bundle.poses.size(), nullptr);
+  for (size_t i = 0; i < in_time.size(); ++i) motion_of[in_time[i]] = &motions[i];
+  for (size_t i = 0; i < bundle.observations.size(); ++i) {
+    BundleProblem::Observation& observation = bundle.observations[i];
+    if (motion_of[observation.pose] == nullptr) continue;
+    const double depth =
+        (bundle.poses[observation.pose].cam_from_world * bundle.points[observation.point].position).z();
+    const Sighting& sighting = *problem->sightings[i];
+    observation.ideal_px = AtMiddleRow(camera, *motion_of[observation.pose], sighting.ideal_px,
+                                       sighting.raw_y, depth > 0 ? 1 / depth : 0);
+  }
+  structure->reference_motion = motions.front();
+  structure->last_motion = motions.back();
 }
 
 }  // namespace
@@ -34,7 +82,8 @@ double InitialStructure::MeanCost() const {
 
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views) {
   InitialStructure structure;
-  BundleProblem problem;
+  ViewsProblem views_problem;
+  BundleProblem& problem = views_problem.bundle;
   problem.poses = {{Rigid3(), true}, {motion.second_from_first, false}};
   std::vector<uint32_t> point_of_keypoint(views.reference.size(), kNone);
   for (uint32_t i = 0; i < views.last.sightings.size(); ++i) {
@@ -44,8 +93,8 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
     // every match.
     const Eigen::Vector3d far = kFarBaselines * camera.Unproject(in_reference.ideal_px);
     problem.points.push_back({motion.is_inlier[i] != 0 ? motion.points_in_first[i] : far, false});
-    problem.observations.push_back(MakeObservation(0, i, in_reference));
-    problem.observations.push_back(MakeObservation(1, i, views.last.sightings[i]));
+    views_problem.Observe(0, i, in_reference);
+    views_problem.Observe(1, i, views.last.sightings[i]);
   }
 
   // The views between start from their neighbour's pose, backwards from the last one.
@@ -69,7 +118,7 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
     problem.poses.push_back({neighbour, false});
     for (const Sighting& sighting : views.between[v].sightings) {
       const uint32_t point = point_of_keypoint[sighting.reference_keypoint];
-      if (point != kNone) problem.observations.push_back(MakeObservation(pose, point, sighting));
+      if (point != kNone) views_problem.Observe(pose, point, sighting);
     }
   }
 
@@ -78,6 +127,10 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
   options.function_tolerance = 1e-5;
   std::vector<uint8_t> is_outlier;
   structure.usable = AdjustBundle(camera, options, {}, &problem, &is_outlier).usable;
+  if (structure.usable && camera.readout_s > 0) {
+    CorrectShutters(camera, views, has_pose, &views_problem, &structure);
+    structure.usable = AdjustBundle(camera, options, {}, &problem, &is_outlier).usable;
+  }
   structure.last_from_reference = problem.poses[1].cam_from_world;
   structure.between_from_reference.resize(views.between.size());
   for (size_t v = 0; v < views.between.size(); ++v) {

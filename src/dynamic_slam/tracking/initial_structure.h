@@ -7,6 +7,7 @@
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/rigid3.h"
+#include "dynamic_slam/geometry/rolling_shutter.h"
 #include "dynamic_slam/geometry/two_view.h"
 
 namespace dynamic_slam {
@@ -16,6 +17,7 @@ struct Sighting {
   uint32_t reference_keypoint = 0;
   Eigen::Vector2d ideal_px = Eigen::Vector2d::Zero();
   double sigma_px = 1;  // scale of its octave
+  float raw_y = 0;      // px
 };
 
 // What one image sees of the reference view. One reference keypoint has at most one sighting.
@@ -27,6 +29,7 @@ struct InitialView {
 // The views of which the first map is made: the reference at the origin, the last one, whose matches gave the
 // motion, and some between.
 struct InitialViews {
+  double reference_timestamp_s = 0;
   std::vector<Sighting> reference;   // all its keypoints: entry i is keypoint i
   std::vector<InitialView> between;  // in the order of time
   InitialView last;                  // one sighting for each match
@@ -42,6 +45,8 @@ struct InitialStructure {
   std::vector<double> costs;     // per match: squared errors of all its sightings, in sigmas, each cut
                                  // off at the outlier limit
   int points = 0;
+  // In the unit of the poses; a rolling shutter only.
+  std::optional<SteadyMotion> reference_motion, last_motion;
 
   double MeanCost() const;
 };

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dynamic_slam/map/static_evidence.h"
+#include "dynamic_slam/tracking/shutter_correction.h"
 
 namespace dynamic_slam {
 namespace {
@@ -32,7 +33,7 @@ void Initializer::Reset() {
   reason_ = "waiting for the first image";
 }
 
-std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& random) {
+std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& random, FrameId untold_from) {
   if (static_cast<int>(frame.features.size()) < options_.min_matches) {
     reason_ = fmt::format("initialising: {} keypoints < {}; point the camera at something with texture",
                           frame.features.size(), options_.min_matches);
@@ -52,6 +53,11 @@ std::optional<InitialProposal> Initializer::Propose(const Frame& frame, Random& 
   // The oldest has seen the camera come farthest: what it lacks is told, if none has enough.
   std::string reason;
   for (size_t i = 0; i < references_.size(); ++i) {
+    if (references_[i].frame().id >= untold_from) {
+      reason_ = "initialising: waiting for the detector's answer about the first view";
+      if (i == 0) reason = reason_;
+      continue;
+    }
     std::optional<InitialProposal> proposal = ProposeFrom(i, frame, std::move(matches[i]), random);
     if (proposal.has_value()) return proposal;
     if (i == 0) reason = reason_;
@@ -169,6 +175,26 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
   return InitialProposal{std::move(best), {}, is_certain, 0};
 }
 
+// The keypoints of both views go to where the middle row's time has them.
+void Initializer::CorrectShutters(const InitialProposal& proposal, double scale, Frame* reference,
+                                  Frame* last) const {
+  const InitialStructure& structure = proposal.structure;
+  const auto correct = [&](std::optional<SteadyMotion> motion, const Rigid3& cam_from_reference,
+                           uint32_t Match::*keypoint, Frame* frame) {
+    if (!motion.has_value()) return;
+    motion->linear_per_s *= scale;
+    std::vector<double> inverse_depths(frame->features.size(), 1.0);  // the median depth is 1
+    for (size_t i = 0; i < proposal.matches.size(); ++i) {
+      if (structure.is_good[i] == 0) continue;
+      const double depth = scale * (cam_from_reference * structure.points_in_reference[i]).z();
+      if (depth > 0) inverse_depths[proposal.matches[i].*keypoint] = 1 / depth;
+    }
+    CorrectShutter(camera_, *motion, inverse_depths, frame);
+  };
+  correct(structure.reference_motion, Rigid3(), &Match::first, reference);
+  correct(structure.last_motion, structure.last_from_reference, &Match::second, last);
+}
+
 std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal, Frame* frame, Map* map) {
   const InitialStructure& structure = proposal.structure;
   // While the start is uncertain, only its own reference is asked on.
@@ -191,6 +217,7 @@ std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal,
   frame->cam_from_world = structure.last_from_reference;
   frame->cam_from_world.translation *= scale;
   frame->ClearLandmarks();
+  CorrectShutters(proposal, scale, &reference, frame);
   const PartId part = map->BeginPart();
   const KeyframeId first_id = InsertKeyframe(reference, map, part);
   const KeyframeId second_id = InsertKeyframe(*frame, map, part);

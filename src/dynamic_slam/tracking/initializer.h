@@ -33,7 +33,15 @@ class Initializer {
 
   // Matches the frame with the reference frames and tries to find the motion between them and the structure.
   // Nothing while that is not possible: reason() says why.
-  std::optional<InitialProposal> Propose(const Frame& frame, Random& random);
+  // untold_from: of FrameObjects; a start is made only from a frame before it.
+  std::optional<InitialProposal> Propose(const Frame& frame, Random& random, FrameId untold_from = {});
+
+  // Calls fn(Frame*) for each frame with which others are matched. What it gives P(at rest) 0 is not used any
+  // more.
+  template <class Fn>
+  void ForEachReference(Fn&& fn) {
+    for (ReferenceView& reference : references_) fn(reference.mutable_frame());
+  }
 
   // Gives the map a new part of two keyframes and their landmarks (median depth 1 in the first), and the
   // frame, which is the one of the proposal, its pose, landmarks and reference.
@@ -58,6 +66,7 @@ class Initializer {
   // well.
   std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result, const InitialViews& views,
                                                  int min_points);
+  void CorrectShutters(const InitialProposal& proposal, double scale, Frame* reference, Frame* last) const;
 
   Camera camera_;
   InitializerOptions options_;

@@ -68,6 +68,63 @@ TEST_F(InitializerTest, MakesAMapThatIsTrueUpToScale) {
   EXPECT_LT(errors[errors.size() / 2], 0.03);
 }
 
+// The median error of depths after a start by a rolling shutter, and the keypoints of both keyframes.
+class RollingStart {
+ public:
+  explicit RollingStart(bool camera_says_so) {
+    world_.SetReadout(kReadout_s);
+    Camera camera = world_.camera();
+    if (!camera_says_so) camera.readout_s = 0;
+    Initializer initializer(camera, {}, SyntheticWorld::OctaveScales());
+    Random random(1);
+    std::vector<SyntheticView> views;
+    for (int i = 0; i < 12 && map_.keyframes().size() == 0; ++i) {
+      // A step of 0.05 and a turn of 0.02 rad, in a second.
+      const Rigid3 pose(ExpSo3({0.02 * i, 0, 0}), {-0.05 * i, 0, 0});
+      const Rigid3 next(ExpSo3({0.02 * (i + 1), 0, 0}), {-0.05 * (i + 1), 0, 0});
+      views.push_back(world_.See(pose, MotionBetween(next * pose.Inverse(), 1)));
+      Frame& frame = views.back().frame;
+      for (const Keypoint& keypoint : frame.features.keypoints)
+        frame.read_px.emplace_back(keypoint.x, keypoint.y);
+      const std::optional<InitialProposal> proposal = initializer.Propose(frame, random);
+      if (proposal.has_value() && proposal->is_certain) initializer.BuildMap(*proposal, &frame, &map_);
+    }
+    if (map_.keyframes().size() == 0) return;
+    std::vector<double> ratios, errors;
+    map_.landmarks().ForEach([&](const Landmark& landmark) {
+      const Observation& seen = landmark.observations()[0];
+      const Eigen::Vector3d& truth = world_.position(views.front().points[seen.keypoint]);
+      ratios.push_back(landmark.position().z() / truth.z());
+      const Keypoint& keypoint = map_.keyframes().At(seen.keyframe).keypoint(seen.keypoint);
+      errors.push_back((world_.camera().Project(truth) - Eigen::Vector2d(keypoint.x, keypoint.y)).norm());
+    });
+    const double scale = MedianOf(&ratios);
+    for (double& ratio : ratios) ratio = std::abs(ratio / scale - 1);
+    depth_error = MedianOf(&ratios);
+    keypoint_error_px = MedianOf(&errors);
+  }
+
+  double depth_error = 1, keypoint_error_px = 1000;
+
+ private:
+  static constexpr double kReadout_s = 0.7;  // of the second between two views
+
+  static double MedianOf(std::vector<double>* values) {
+    std::sort(values->begin(), values->end());
+    return (*values)[values->size() / 2];
+  }
+
+  SyntheticWorld world_{1500, 0.1};
+  Map map_{SyntheticWorld::OctaveScales()};
+};
+
+TEST_F(InitializerTest, ARollingShutterThatIsKnownBendsNoStart) {
+  const RollingStart known(true), unknown(false);
+  EXPECT_LT(known.depth_error, 0.02);
+  EXPECT_LT(known.keypoint_error_px, 0.5);
+  EXPECT_GT(unknown.keypoint_error_px, 1);
+}
+
 TEST_F(InitializerTest, ACameraThatTurnsOnlyWaits) {
   for (int i = 0; i < 12; ++i) EXPECT_FALSE(Try(Rigid3(ExpSo3({0, 0.01 * i, 0}), {0, 0, 0})));
   EXPECT_THAT(initializer_.reason(), HasSubstr("parallax"));
@@ -92,6 +149,17 @@ TEST_F(InitializerTest, AViewFromBetweenTakesOverWhenTheFirstIsOutOfSight) {
   while (initializer_.reference() == FrameId(0) && frame < 12) ASSERT_FALSE(see(++frame));
   EXPECT_GT(initializer_.reference(), FrameId(0));
   EXPECT_LT(initializer_.reference(), FrameId(static_cast<uint32_t>(frame)));
+}
+
+TEST_F(InitializerTest, AStartWaitsUntilTheDetectorHasToldOfItsFirstView) {
+  const auto see = [&](double x, FrameId untold_from) {
+    views_.push_back(world_.See(SidewaysPose(x)));
+    return initializer_.Propose(views_.back().frame, random_, untold_from).has_value();
+  };
+  double x = 0;
+  while (x < 0.5) EXPECT_FALSE(see(x += 0.05, FrameId(0)));
+  EXPECT_THAT(initializer_.reason(), HasSubstr("waiting for the detector's answer"));
+  EXPECT_TRUE(see(x, FrameId(1))) << initializer_.reason();
 }
 
 TEST_F(InitializerTest, TooFewKeypointsAreNoFirstView) {

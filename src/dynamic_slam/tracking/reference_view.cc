@@ -20,9 +20,10 @@ double ScaleOf(const Keypoint& keypoint, const std::vector<float>& octave_scales
 }  // namespace
 
 ReferenceView::ReferenceView(const Frame& frame, const std::vector<float>& octave_scales) : frame_(frame) {
+  views_.reference_timestamp_s = frame.timestamp_s;
   for (uint32_t i = 0; i < frame.features.size(); ++i) {
     const Keypoint& keypoint = frame.features.keypoints[i];
-    views_.reference.push_back({i, {keypoint.x, keypoint.y}, ScaleOf(keypoint, octave_scales)});
+    views_.reference.push_back({i, frame.ReadPx(i), ScaleOf(keypoint, octave_scales), keypoint.raw_y});
     last_places_.emplace_back(keypoint.x, keypoint.y);
   }
 }
@@ -80,7 +81,7 @@ void ReferenceView::AddView(const Frame& frame, const std::vector<Match>& matche
   for (const Match& match : matches) {
     const Keypoint& keypoint = frame.features.keypoints[match.second];
     views_.last.sightings.push_back(
-        {match.first, {keypoint.x, keypoint.y}, ScaleOf(keypoint, octave_scales)});
+        {match.first, frame.ReadPx(match.second), ScaleOf(keypoint, octave_scales), keypoint.raw_y});
   }
 }
 

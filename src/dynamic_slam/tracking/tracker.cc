@@ -49,6 +49,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       octave_scales_(map->Read()->octave_scales()),
       bounds_(camera.IdealBounds()),
       extractor_(orb, camera),
+      shutter_(camera),
       initializer_(camera, options.initializer, octave_scales_),
       localiser_(camera, options, octave_scales_, map),
       filter_(camera, dynamic, octave_scales_),
@@ -71,6 +72,7 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   frame_.grid.Build(frame_.features, bounds_);
   frame_.static_probability.clear();
   frame_.ClearLandmarks();
+  shutter_.Expect(PredictMotion(), last_, &frame_);
   frame_.reference = last_.reference;
   frame_.reference_unit = 1;
   DS_TRACE("tracking/flow");
@@ -101,12 +103,20 @@ void Tracker::LookBesideBoxes() {
   extractor_.SetMinThreshold(is_starved_ ? std::min(usual, orb_options_.fast_threshold_starved) : usual);
 }
 
-TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes_waiting,
-                              bool objects_awaited) {
+// The local map knows the pose better than the last frame's landmarks did, and with it the motion.
+void Tracker::RefinePoseAndShutter() {
+  shutter_.Correct(last_, &frame_);
+  const int inliers = localiser_.pose_tracker().RefinePose(&frame_);
+  if (inliers >= MinInliers()) inliers_ = inliers;
+}
+
+TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting) {
   DS_TRACE("tracking");
   inliers_ = 0;
   reason_.clear();
-  const DynamicKeypoints judged = filter_.Judge(objects, flow_, last_, &frame_);
+  late_judgement_.Judge(objects.late, filter_, &initializer_, map_);
+  untold_from_ = objects.untold_from;
+  const DynamicKeypoints judged = filter_.Judge(objects.boxes, flow_, last_, &frame_);
   share_in_boxes_ = frame_.features.size() == 0
                         ? 0
                         : static_cast<double>(judged.InBoxes()) / static_cast<double>(frame_.features.size());
@@ -121,8 +131,6 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
     if (state_ == TrackingState::kTracking && !result.part_was_erased) {
       InsertKeyframeIfDue(keyframes_waiting, &result);
     }
-  } else if (state_ == TrackingState::kInitialising && objects_awaited) {
-    reason_ = "initialising: waiting for the detector's first answer";
   } else if (state_ == TrackingState::kInitialising) {
     Initialise(&result);
   } else {
@@ -131,6 +139,7 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
     ++lost_frames_;
     StartAnewWhenLostForLong(&result);
   }
+  RememberKeyframes(result.new_keyframes);
   last_has_pose_ = state_ == TrackingState::kTracking;
   if (start_is_young_ && last_has_pose_) {
     const PartId part = PartOfFrame();
@@ -143,6 +152,12 @@ TrackingResult Tracker::Track(std::span<const DynamicBox> objects, int keyframes
   result.inliers = inliers_;
   result.reason = reason_;
   return result;
+}
+
+void Tracker::RememberKeyframes(const std::vector<KeyframeId>& keyframes) {
+  if (keyframes.empty()) return;
+  const auto map = map_->Read();
+  for (const KeyframeId id : keyframes) late_judgement_.Remember(map->keyframes().At(id).frame_id(), id);
 }
 
 void Tracker::AcceptPose() {
@@ -176,7 +191,7 @@ void Tracker::SetLocaliseOnly(bool localise_only) {
 }
 
 void Tracker::Initialise(TrackingResult* result) {
-  const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
+  const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_, untold_from_);
   reason_ = initializer_.reason();
   if (proposal.has_value()) {
     StartMap(*proposal, result);
@@ -197,6 +212,7 @@ void Tracker::StartMap(const InitialProposal& proposal, TrackingResult* result) 
     });
     inliers_ = map->keyframes().At(frame_.reference).LandmarkCount();
   }
+  shutter_.Reset();
   start_is_young_ = true;
   start_is_certain_ = proposal.is_certain;
   if (start_is_certain_) initializer_.Reset();
@@ -215,7 +231,7 @@ void Tracker::ReviewStart(TrackingResult* result) {
   const bool is_in_start = PartOfFrame() == start_part_;
   if (is_in_start && frame_.id.value() - start_frame_.value() < kMaxReviews) {
     const FrameId reference = initializer_.reference();
-    const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_);
+    const std::optional<InitialProposal> proposal = initializer_.Propose(frame_, random_, untold_from_);
     if (initializer_.reference() != reference) {
       // The first view is out of sight, and nobody knows which motion it was.
       ErasePart(result);
@@ -272,6 +288,8 @@ void Tracker::Reset() {
   most_inliers_ = 0;
   initializer_.Reset();
   filter_.Reset();
+  late_judgement_.Reset();
+  shutter_.Reset();
   share_in_boxes_ = 0;
   is_starved_ = false;
   random_ = Random(seed_);
@@ -338,7 +356,10 @@ bool Tracker::TrackFromLastFrame() {
         fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
     return false;
   }
-  return TrackLocalMap(options_.local_map_radius_px, MinInliers());
+  shutter_.Correct(last_, &frame_);
+  if (!TrackLocalMap(options_.local_map_radius_px, MinInliers())) return false;
+  if (shutter_.IsRolling()) RefinePoseAndShutter();
+  return true;
 }
 
 int Tracker::MinInliers() const {
@@ -399,27 +420,6 @@ void Tracker::CountVisibility() {
   }
   for (const LandmarkId id : localiser_.pose_tracker().rejected())
     visibility_.Judge(id, filter_.Evidence(0.5f, false));
-}
-
-void VisibilityLog::ApplyTo(Map* map) {
-  for (const LandmarkId id : visible) {
-    if (const LandmarkId now = map->Resolve(id); now.IsValid()) ++map->landmarks().At(now).visible_count;
-  }
-  for (const LandmarkId id : found) {
-    const LandmarkId now = map->Resolve(id);
-    if (!now.IsValid()) continue;
-    Landmark& landmark = map->landmarks().At(now);
-    ++landmark.found_count;
-    // Also found where it was not expected.
-    landmark.visible_count = std::max(landmark.visible_count, landmark.found_count);
-  }
-  for (const auto& [id, evidence] : static_evidence) {
-    const LandmarkId now = map->Resolve(id);
-    if (!now.IsValid()) continue;
-    float& odds = map->landmarks().At(now).static_log_odds;
-    odds = std::clamp(odds + evidence, -kMaxStaticLogOdds, kMaxStaticLogOdds);
-  }
-  Clear();
 }
 
 void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result) {

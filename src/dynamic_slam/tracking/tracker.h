@@ -13,12 +13,16 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/semantics/frame_objects.h"
 #include "dynamic_slam/tracking/dynamic_filter.h"
 #include "dynamic_slam/tracking/initializer.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
+#include "dynamic_slam/tracking/late_judgement.h"
 #include "dynamic_slam/tracking/map_localiser.h"
+#include "dynamic_slam/tracking/shutter_correction.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 #include "dynamic_slam/tracking/tracking_state.h"
+#include "dynamic_slam/tracking/visibility_log.h"
 
 namespace dynamic_slam {
 
@@ -36,23 +40,6 @@ struct TrackingResult {
   int min_inliers = 0;                       // that a pose of this image needs
   bool may_be_erased = false;                // the part of the map in which the pose is: it is young
   bool part_was_erased = false;              // of the map, with the poses of the frames in it
-};
-
-// Which landmarks were to be seen in frames, and which were found; the map is told with the next keyframe.
-struct VisibilityLog {
-  std::vector<LandmarkId> visible, found;
-  std::vector<std::pair<LandmarkId, float>> static_evidence;  // to be added to the log-odds
-
-  void Judge(LandmarkId id, float evidence) {
-    if (evidence != 0) static_evidence.emplace_back(id, evidence);
-  }
-
-  void ApplyTo(Map* map);  // and empties itself
-  void Clear() {
-    visible.clear();
-    found.clear();
-    static_evidence.clear();
-  }
 };
 
 // From images to poses: a state machine over initialisation, tracking and being lost. Synchronous; looks at
@@ -73,9 +60,8 @@ class Tracker {
   const std::vector<PointMotion>& Motions() const { return flow_.motions(); }
 
   // Finds the pose of the frame. objects: what is in it. keyframes_waiting: those that local mapping has not
-  // come to yet. objects_awaited: what is in the view is not known yet, and no map is started meanwhile.
-  TrackingResult Track(std::span<const DynamicBox> objects = {}, int keyframes_waiting = 0,
-                       bool objects_awaited = false);
+  // come to yet.
+  TrackingResult Track(const FrameObjects& objects = {}, int keyframes_waiting = 0);
 
   // The rotation that was found; none without a pose in this frame or the last.
   std::optional<Eigen::Quaterniond> Rotation() const;
@@ -94,6 +80,7 @@ class Tracker {
 
  private:
   void AcceptPose();
+  void RememberKeyframes(const std::vector<KeyframeId>& keyframes);
   void Initialise(TrackingResult* result);
   void StartMap(const InitialProposal& proposal, TrackingResult* result);
   // While the start is not certain: whether the map is still believed.
@@ -101,6 +88,7 @@ class Tracker {
   // Erases the part of the map in which the camera is, or was last.
   void ErasePart(TrackingResult* result);
   void LookBesideBoxes();
+  void RefinePoseAndShutter();
   void ForgetPose();
   PartId PartOfFrame() const;
   int KeyframesIn(PartId part) const;
@@ -123,10 +111,13 @@ class Tracker {
   std::vector<float> octave_scales_;
   std::array<double, 4> bounds_;
   OrbExtractor extractor_;
+  ShutterCorrection shutter_;
   Initializer initializer_;
+  FrameId untold_from_;
   MapLocaliser localiser_;
   DynamicFilter filter_;
   KeypointFlow flow_;
+  LateJudgement late_judgement_;
   double share_in_boxes_ = 0;       // of the keypoints, those in the boxes of movers
   bool is_starved_ = false;         // boxes leave too few keypoints
   std::vector<cv::Rect> deferred_;  // kept for its memory

@@ -1,0 +1,25 @@
+#include "dynamic_slam/geometry/rolling_shutter.h"
+
+#include <Eigen/Geometry>
+
+namespace dynamic_slam {
+
+SteadyMotion MotionBetween(const Rigid3& later_from_earlier, double dt_s) {
+  return {LogSo3(later_from_earlier.rotation) / dt_s, later_from_earlier.translation / dt_s};
+}
+
+SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b) {
+  return {0.5 * (a.angular_rad_s + b.angular_rad_s), 0.5 * (a.linear_per_s + b.linear_per_s)};
+}
+
+Eigen::Vector2d AtMiddleRow(const Camera& camera, const SteadyMotion& motion, const Eigen::Vector2d& ideal_px,
+                            double raw_y, double inverse_depth) {
+  const double since_s = (raw_y / (camera.height - 1) - 0.5) * camera.readout_s;
+  const Eigen::Vector3d ray = camera.Unproject(ideal_px);
+  const Eigen::Vector3d turn = motion.angular_rad_s.cross(ray);
+  const Eigen::Vector3d then = ray - since_s * (turn + inverse_depth * motion.linear_per_s) +
+                               0.5 * since_s * since_s * motion.angular_rad_s.cross(turn);
+  return camera.Project(then);
+}
+
+}  // namespace dynamic_slam

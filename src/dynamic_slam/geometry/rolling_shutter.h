@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/geometry/rigid3.h"
+
+namespace dynamic_slam {
+
+// How a camera moves, seen from itself: what is at rest at x_in_cam goes with angular_rad_s x x_in_cam +
+// linear_per_s.
+struct SteadyMotion {
+  Eigen::Vector3d angular_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d linear_per_s = Eigen::Vector3d::Zero();  // in the unit of the poses
+};
+
+// The steady motion from one pose to another, dt_s later, or earlier where that is negative; not 0.
+SteadyMotion MotionBetween(const Rigid3& later_from_earlier, double dt_s);
+
+// The mean of two: at the pose between them.
+SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b);
+
+// A rolling shutter reads the rows of an image one after the other, for Camera::readout_s in all, and a pose
+// is that of the camera when it reads the middle one. Returns where (ideal px) the camera would have seen
+// then what it saw at ideal_px in the raw row raw_y. inverse_depth: of what it shows, along the optical axis;
+// 0: far away. To second order in the rotation since: within 0.01 px at 3 rad/s and 20 ms.
+Eigen::Vector2d AtMiddleRow(const Camera& camera, const SteadyMotion& motion, const Eigen::Vector2d& ideal_px,
+                            double raw_y, double inverse_depth);
+
+}  // namespace dynamic_slam
