@@ -110,12 +110,12 @@ FrameId DetectionStage::UntoldFrom(double timestamp_s) const {
 std::vector<LateObjects> DetectionStage::NewlyTold(FrameId told) const {
   std::vector<LateObjects> late;
   for (const FrameBoxes& earlier : compensation_->EarlierBoxes(told)) {
-    LateObjects& objects = late.emplace_back(earlier.frame, std::vector<DynamicBox>());
+    LateObjects objects{earlier.frame, {}};
     for (const CompensatedBox& box : earlier.boxes) {
       const bool is_new = box.age_frames == static_cast<int>(earlier.frame.value() - told.value()) + 1;
       if (is_new) objects.boxes.push_back(score_.Judge(box));
     }
-    if (objects.boxes.empty()) late.pop_back();
+    if (!objects.boxes.empty()) late.push_back(std::move(objects));
   }
   return late;
 }

@@ -144,16 +144,26 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
     reason_ = "initialising: waiting for a third view, to be sure";
     return std::nullopt;
   }
-  std::vector<InitialStructure> structures{RefineMotion(camera_, result.motion, views)};
-  for (const TwoViewMotion& rival : result.rivals) structures.push_back(RefineMotion(camera_, rival, views));
-  std::stable_sort(
-      structures.begin(), structures.end(),
-      [](const InitialStructure& a, const InitialStructure& b) { return a.MeanCost() < b.MeanCost(); });
-  InitialStructure& best = structures.front();
+  // As if all rows were read at once: what a wrong motion makes of a rolling shutter helps it to fit.
+  Camera at_once = camera_;
+  at_once.readout_s = 0;
+  struct Candidate {
+    const TwoViewMotion* motion;
+    InitialStructure structure;
+  };
+  std::vector<Candidate> candidates;
+  candidates.push_back({&result.motion, RefineMotion(at_once, result.motion, views)});
+  for (const TwoViewMotion& rival : result.rivals)
+    candidates.push_back({&rival, RefineMotion(at_once, rival, views)});
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.structure.MeanCost() < b.structure.MeanCost();
+  });
+  InitialStructure& best = candidates.front().structure;
   double cost_ratio = 0, preference = std::numeric_limits<double>::max();
-  for (size_t i = 1; i < structures.size(); ++i) {
-    cost_ratio = std::max(cost_ratio, best.MeanCost() / structures[i].MeanCost());
-    preference = std::min(preference, Preference(best, structures[i]));
+  for (size_t i = 1; i < candidates.size(); ++i) {
+    const InitialStructure& other = candidates[i].structure;
+    cost_ratio = std::max(cost_ratio, best.MeanCost() / other.MeanCost());
+    preference = std::min(preference, Preference(best, other));
   }
   const bool is_certain = preference > kMinPreference && cost_ratio < options_.max_cost_ratio;
   if (!is_certain && preference < kMinTryPreference) {
@@ -163,6 +173,7 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
         views.between.size() + 2, cost_ratio, options_.max_cost_ratio, preference, kMinTryPreference);
     return std::nullopt;
   }
+  if (camera_.readout_s > 0) best = RefineMotion(camera_, *candidates.front().motion, views);
   if (!best.usable) {
     reason_ = "initialising: the first bundle adjustment failed; trying the next image";
     return std::nullopt;
