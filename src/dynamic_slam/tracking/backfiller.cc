@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "dynamic_slam/base/trace.h"
-#include "dynamic_slam/tracking/shutter_correction.h"
 
 namespace dynamic_slam {
 namespace {
@@ -41,10 +40,9 @@ Eigen::Vector3d CentreOf(const AnchoredPose& pose, const Map& map) {
 }  // namespace
 
 Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map)
-    : camera_(camera),
-      options_(options),
+    : options_(options),
       map_(map),
-      bounds_(camera.IdealBounds()),
+      shutter_(camera),
       localiser_(camera, options, map->Read()->octave_scales(), map),
       seed_(seed),
       random_(seed) {}
@@ -105,7 +103,7 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
 }
 
 void Backfiller::CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const {
-  if (!(camera_.readout_s > 0)) return;
+  if (!shutter_.IsRolling()) return;
   const auto next = known.upper_bound(frame->timestamp_s);
   const AnchoredPose* nearest = next == known.end() ? nullptr : &next->second;
   if (next != known.begin()) {
@@ -121,8 +119,7 @@ void Backfiller::CorrectShutterAt(const Known& known, const Guess& guess, Frame*
   const SteadyMotion motion =
       MotionBetween(guess.cam_from_world * other.Inverse(), frame->timestamp_s - nearest->timestamp_s);
   const double depth = map->MedianDepth(guess.keyframe);
-  CorrectShutter(camera_, motion, depth > 0 ? 1 / depth : 0, frame);
-  frame->grid.Build(frame->features, bounds_);
+  shutter_.Move(motion, depth > 0 ? 1 / depth : 0, frame);
 }
 
 std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* kept) {
@@ -139,9 +136,8 @@ std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* 
   frame.timestamp_s = kept->timestamp_s;
   frame.features = kept->features;
   frame.static_probability = kept->static_probability;
-  frame.grid.Build(frame.features, bounds_);
   frame.ClearLandmarks();
-  if (camera_.readout_s > 0) RememberReadPlaces(&frame);
+  shutter_.Begin(&frame);
   const auto is_plausible = [&] {
     localiser_.Anchor(&frame);
     return IsPlausible(known, {frame.timestamp_s, frame.reference, frame.cam_from_reference});

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <deque>
 #include <functional>
@@ -14,6 +13,7 @@
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/tracking/map_localiser.h"
+#include "dynamic_slam/tracking/shutter_correction.h"
 
 namespace dynamic_slam {
 
@@ -71,10 +71,9 @@ class Backfiller {
   void Extrapolate(const AnchoredPose& nearer, const AnchoredPose* farther, double timestamp_s,
                    const Map& map, std::vector<Guess>* guesses) const;
 
-  Camera camera_;
   TrackerOptions options_;
   SharedMap* map_;
-  std::array<double, 4> bounds_;
+  ShutterCorrection shutter_;
   MapLocaliser localiser_;
   uint64_t seed_;
   Random random_;

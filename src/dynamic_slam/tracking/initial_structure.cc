@@ -21,16 +21,40 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 // Too few sightings say nothing of a view's pose.
 constexpr int kMinSightings = 20;
 
-// A bundle of views, and which sighting each of its observations is.
-struct ViewsProblem {
-  BundleProblem bundle;
-  std::vector<const Sighting*> sightings;
+BundleProblem::Observation MakeObservation(uint32_t pose, uint32_t point, const Sighting& sighting) {
+  return {pose, point, sighting.ideal_px, 1.0 / sighting.sigma_px, 1.0};
+}
 
-  void Observe(uint32_t pose, uint32_t point, const Sighting& sighting) {
-    bundle.observations.push_back({pose, point, sighting.ideal_px, 1.0 / sighting.sigma_px, 1.0});
-    sightings.push_back(&sighting);
+// The match of each keypoint of the reference, or kNone.
+std::vector<uint32_t> MatchesOfKeypoints(const InitialViews& views) {
+  std::vector<uint32_t> matches(views.reference.size(), kNone);
+  for (uint32_t i = 0; i < views.last.sightings.size(); ++i)
+    matches[views.last.sightings[i].reference_keypoint] = i;
+  return matches;
+}
+
+// Solves a bundle whose points are the matches, whose first observations are those of each match in the outer
+// two views, and whose last view has the pose `last`.
+void Solve(const Camera& camera, size_t last, BundleProblem* problem, InitialStructure* structure) {
+  BundleOptions options;
+  options.max_iterations = 15;
+  options.function_tolerance = 1e-5;
+  std::vector<uint8_t> is_outlier;
+  structure->usable = AdjustBundle(camera, options, {}, problem, &is_outlier).usable;
+  structure->last_from_reference = problem->poses[last].cam_from_world;
+  const Eigen::Vector3d last_center = structure->last_from_reference.TargetOriginInSource();
+  structure->points_in_reference.clear();
+  structure->is_good.clear();
+  structure->points = 0;
+  for (size_t i = 0; i < problem->points.size(); ++i) {
+    const Eigen::Vector3d& point = problem->points[i].position;
+    structure->points_in_reference.push_back(point);
+    const bool is_good = is_outlier[2 * i] == 0 && is_outlier[2 * i + 1] == 0 &&
+                         ParallaxAngle(point, point - last_center) > kMinParallaxRad;
+    structure->is_good.push_back(is_good);
+    structure->points += is_good;
   }
-};
+}
 
 // The motions of the views, in the order of time, from their neighbours' poses.
 std::vector<SteadyMotion> MotionsOf(const std::vector<Rigid3>& poses, const std::vector<double>& stamps_s) {
@@ -42,37 +66,6 @@ std::vector<SteadyMotion> MotionsOf(const std::vector<Rigid3>& poses, const std:
   return motions;
 }
 
-// Moves what the views saw to the time of their middle rows, by the motions that their poses tell.
-void CorrectShutters(const Camera& camera, const InitialViews& views, const std::vector<uint8_t>& has_pose,
-                     ViewsProblem* problem, InitialStructure* structure) {
-  BundleProblem& bundle = problem->bundle;
-  std::vector<uint32_t> in_time{0};  // the problem has those between backwards, after the outer two
-  std::vector<double> stamps_s{views.reference_timestamp_s};
-  for (uint32_t v = 0; v < views.between.size(); ++v) {
-    if (has_pose[v] == 0) continue;
-    in_time.push_back(static_cast<uint32_t>(1 + views.between.size()) - v);
-    stamps_s.push_back(views.between[v].timestamp_s);
-  }
-  in_time.push_back(1);
-  stamps_s.push_back(views.last.timestamp_s);
-  std::vector<Rigid3> poses;
-  for (const uint32_t pose : in_time) poses.push_back(bundle.poses[pose].cam_from_world);
-  const std::vector<SteadyMotion> motions = MotionsOf(poses, stamps_s);
-  std::vector<const SteadyMotion*> motion_of(bundle.poses.size(), nullptr);
-  for (size_t i = 0; i < in_time.size(); ++i) motion_of[in_time[i]] = &motions[i];
-  for (size_t i = 0; i < bundle.observations.size(); ++i) {
-    BundleProblem::Observation& observation = bundle.observations[i];
-    if (motion_of[observation.pose] == nullptr) continue;
-    const double depth =
-        (bundle.poses[observation.pose].cam_from_world * bundle.points[observation.point].position).z();
-    const Sighting& sighting = *problem->sightings[i];
-    observation.ideal_px = AtMiddleRow(camera, *motion_of[observation.pose], sighting.ideal_px,
-                                       sighting.raw_y, depth > 0 ? 1 / depth : 0);
-  }
-  structure->reference_motion = motions.front();
-  structure->last_motion = motions.back();
-}
-
 }  // namespace
 
 double InitialStructure::MeanCost() const {
@@ -82,19 +75,17 @@ double InitialStructure::MeanCost() const {
 
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views) {
   InitialStructure structure;
-  ViewsProblem views_problem;
-  BundleProblem& problem = views_problem.bundle;
+  BundleProblem problem;
   problem.poses = {{Rigid3(), true}, {motion.second_from_first, false}};
-  std::vector<uint32_t> point_of_keypoint(views.reference.size(), kNone);
+  const std::vector<uint32_t> point_of_keypoint = MatchesOfKeypoints(views);
   for (uint32_t i = 0; i < views.last.sightings.size(); ++i) {
     const Sighting& in_reference = views.reference[views.last.sightings[i].reference_keypoint];
-    point_of_keypoint[in_reference.reference_keypoint] = i;
     // What two views cannot place starts far away: motions can be compared only when each has to explain
     // every match.
     const Eigen::Vector3d far = kFarBaselines * camera.Unproject(in_reference.ideal_px);
     problem.points.push_back({motion.is_inlier[i] != 0 ? motion.points_in_first[i] : far, false});
-    views_problem.Observe(0, i, in_reference);
-    views_problem.Observe(1, i, views.last.sightings[i]);
+    problem.observations.push_back(MakeObservation(0, i, in_reference));
+    problem.observations.push_back(MakeObservation(1, i, views.last.sightings[i]));
   }
 
   // The views between start from their neighbour's pose, backwards from the last one.
@@ -118,20 +109,11 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
     problem.poses.push_back({neighbour, false});
     for (const Sighting& sighting : views.between[v].sightings) {
       const uint32_t point = point_of_keypoint[sighting.reference_keypoint];
-      if (point != kNone) views_problem.Observe(pose, point, sighting);
+      if (point != kNone) problem.observations.push_back(MakeObservation(pose, point, sighting));
     }
   }
 
-  BundleOptions options;
-  options.max_iterations = 15;
-  options.function_tolerance = 1e-5;
-  std::vector<uint8_t> is_outlier;
-  structure.usable = AdjustBundle(camera, options, {}, &problem, &is_outlier).usable;
-  if (structure.usable && camera.readout_s > 0) {
-    CorrectShutters(camera, views, has_pose, &views_problem, &structure);
-    structure.usable = AdjustBundle(camera, options, {}, &problem, &is_outlier).usable;
-  }
-  structure.last_from_reference = problem.poses[1].cam_from_world;
+  Solve(camera, 1, &problem, &structure);
   structure.between_from_reference.resize(views.between.size());
   for (size_t v = 0; v < views.between.size(); ++v) {
     // The problem has them backwards, after the outer two.
@@ -149,16 +131,52 @@ InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion,
     }
     structure.costs[observation.point] += std::min(cost, kChi2TwoDof);
   }
-  const Eigen::Vector3d last_center = structure.last_from_reference.TargetOriginInSource();
-  for (size_t i = 0; i < views.last.sightings.size(); ++i) {
-    const Eigen::Vector3d& point = problem.points[i].position;
-    structure.points_in_reference.push_back(point);
-    const bool is_good = is_outlier[2 * i] == 0 && is_outlier[2 * i + 1] == 0 &&
-                         ParallaxAngle(point, point - last_center) > kMinParallaxRad;
-    structure.is_good.push_back(is_good);
-    structure.points += is_good;
-  }
   return structure;
+}
+
+void CorrectShutters(const Camera& camera, const InitialViews& views, InitialStructure* structure) {
+  // The views that have a pose, in the order of time.
+  std::vector<size_t> between;
+  std::vector<Rigid3> poses{Rigid3()};
+  std::vector<double> stamps_s{views.reference_timestamp_s};
+  for (size_t v = 0; v < views.between.size(); ++v) {
+    if (!structure->between_from_reference[v].has_value()) continue;
+    between.push_back(v);
+    poses.push_back(*structure->between_from_reference[v]);
+    stamps_s.push_back(views.between[v].timestamp_s);
+  }
+  poses.push_back(structure->last_from_reference);
+  stamps_s.push_back(views.last.timestamp_s);
+  const std::vector<SteadyMotion> motions = MotionsOf(poses, stamps_s);
+
+  BundleProblem problem;
+  for (const Rigid3& pose : poses) problem.poses.push_back({pose, problem.poses.empty()});
+  for (const Eigen::Vector3d& point : structure->points_in_reference)
+    problem.points.push_back({point, false});
+  const auto observe = [&](size_t pose, uint32_t point, const Sighting& sighting) {
+    const double depth = (poses[pose] * structure->points_in_reference[point]).z();
+    problem.observations.push_back(MakeObservation(static_cast<uint32_t>(pose), point, sighting));
+    problem.observations.back().ideal_px =
+        AtMiddleRow(camera, motions[pose], sighting.ideal_px, sighting.raw_y, depth > 0 ? 1 / depth : 0);
+  };
+  const size_t last = poses.size() - 1;
+  for (uint32_t i = 0; i < views.last.sightings.size(); ++i) {
+    const Sighting& sighting = views.last.sightings[i];
+    observe(0, i, views.reference[sighting.reference_keypoint]);
+    observe(last, i, sighting);
+  }
+  const std::vector<uint32_t> point_of_keypoint = MatchesOfKeypoints(views);
+  for (size_t i = 0; i < between.size(); ++i) {
+    for (const Sighting& sighting : views.between[between[i]].sightings) {
+      const uint32_t point = point_of_keypoint[sighting.reference_keypoint];
+      if (point != kNone) observe(i + 1, point, sighting);
+    }
+  }
+  Solve(camera, last, &problem, structure);
+  for (size_t i = 0; i < between.size(); ++i)
+    structure->between_from_reference[between[i]] = problem.poses[i + 1].cam_from_world;
+  structure->reference_motion = motions.front();
+  structure->last_motion = motions.back();
 }
 
 double Preference(const InitialStructure& a, const InitialStructure& b) {

@@ -51,7 +51,13 @@ struct InitialStructure {
   double MeanCost() const;
 };
 
+// As if all rows of an image were read at once: what a wrong motion makes of a rolling shutter helps it to
+// fit, so that motions are told apart without.
 InitialStructure RefineMotion(const Camera& camera, const TwoViewMotion& motion, const InitialViews& views);
+
+// A rolling shutter: solves a usable structure again, with what the views saw moved to the time of their
+// middle rows by the motions that their poses tell. The costs stay.
+void CorrectShutters(const Camera& camera, const InitialViews& views, InitialStructure* structure);
 
 // How sure it is that `a` fits the views better than `b`: the mean difference of their costs over matches, in
 // standard errors of that mean. A scene close to a plane allows two motions between two views, but not

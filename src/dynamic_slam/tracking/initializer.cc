@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "dynamic_slam/map/static_evidence.h"
-#include "dynamic_slam/tracking/shutter_correction.h"
 
 namespace dynamic_slam {
 namespace {
@@ -23,7 +22,7 @@ constexpr double kMinTryPreference = 8.0;
 
 Initializer::Initializer(const Camera& camera, const InitializerOptions& options,
                          std::vector<float> octave_scales)
-    : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)) {
+    : camera_(camera), options_(options), octave_scales_(std::move(octave_scales)), shutter_(camera) {
   Reset();
 }
 
@@ -144,26 +143,16 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
     reason_ = "initialising: waiting for a third view, to be sure";
     return std::nullopt;
   }
-  // As if all rows were read at once: what a wrong motion makes of a rolling shutter helps it to fit.
-  Camera at_once = camera_;
-  at_once.readout_s = 0;
-  struct Candidate {
-    const TwoViewMotion* motion;
-    InitialStructure structure;
-  };
-  std::vector<Candidate> candidates;
-  candidates.push_back({&result.motion, RefineMotion(at_once, result.motion, views)});
-  for (const TwoViewMotion& rival : result.rivals)
-    candidates.push_back({&rival, RefineMotion(at_once, rival, views)});
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return a.structure.MeanCost() < b.structure.MeanCost();
-  });
-  InitialStructure& best = candidates.front().structure;
+  std::vector<InitialStructure> structures{RefineMotion(camera_, result.motion, views)};
+  for (const TwoViewMotion& rival : result.rivals) structures.push_back(RefineMotion(camera_, rival, views));
+  std::stable_sort(
+      structures.begin(), structures.end(),
+      [](const InitialStructure& a, const InitialStructure& b) { return a.MeanCost() < b.MeanCost(); });
+  InitialStructure& best = structures.front();
   double cost_ratio = 0, preference = std::numeric_limits<double>::max();
-  for (size_t i = 1; i < candidates.size(); ++i) {
-    const InitialStructure& other = candidates[i].structure;
-    cost_ratio = std::max(cost_ratio, best.MeanCost() / other.MeanCost());
-    preference = std::min(preference, Preference(best, other));
+  for (size_t i = 1; i < structures.size(); ++i) {
+    cost_ratio = std::max(cost_ratio, best.MeanCost() / structures[i].MeanCost());
+    preference = std::min(preference, Preference(best, structures[i]));
   }
   const bool is_certain = preference > kMinPreference && cost_ratio < options_.max_cost_ratio;
   if (!is_certain && preference < kMinTryPreference) {
@@ -173,7 +162,7 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
         views.between.size() + 2, cost_ratio, options_.max_cost_ratio, preference, kMinTryPreference);
     return std::nullopt;
   }
-  if (camera_.readout_s > 0) best = RefineMotion(camera_, *candidates.front().motion, views);
+  if (best.usable && shutter_.IsRolling()) CorrectShutters(camera_, views, &best);
   if (!best.usable) {
     reason_ = "initialising: the first bundle adjustment failed; trying the next image";
     return std::nullopt;
@@ -187,8 +176,8 @@ std::optional<InitialProposal> Initializer::ChooseStructure(const TwoViewResult&
 }
 
 // The keypoints of both views go to where the middle row's time has them.
-void Initializer::CorrectShutters(const InitialProposal& proposal, double scale, Frame* reference,
-                                  Frame* last) const {
+void Initializer::MoveKeypoints(const InitialProposal& proposal, double scale, Frame* reference,
+                                Frame* last) const {
   const InitialStructure& structure = proposal.structure;
   const auto correct = [&](std::optional<SteadyMotion> motion, const Rigid3& cam_from_reference,
                            uint32_t Match::*keypoint, Frame* frame) {
@@ -200,7 +189,7 @@ void Initializer::CorrectShutters(const InitialProposal& proposal, double scale,
       const double depth = scale * (cam_from_reference * structure.points_in_reference[i]).z();
       if (depth > 0) inverse_depths[proposal.matches[i].*keypoint] = 1 / depth;
     }
-    CorrectShutter(camera_, *motion, inverse_depths, frame);
+    shutter_.Move(*motion, inverse_depths, frame);
   };
   correct(structure.reference_motion, Rigid3(), &Match::first, reference);
   correct(structure.last_motion, structure.last_from_reference, &Match::second, last);
@@ -228,7 +217,7 @@ std::vector<AnchoredPose> Initializer::BuildMap(const InitialProposal& proposal,
   frame->cam_from_world = structure.last_from_reference;
   frame->cam_from_world.translation *= scale;
   frame->ClearLandmarks();
-  CorrectShutters(proposal, scale, &reference, frame);
+  MoveKeypoints(proposal, scale, &reference, frame);
   const PartId part = map->BeginPart();
   const KeyframeId first_id = InsertKeyframe(reference, map, part);
   const KeyframeId second_id = InsertKeyframe(*frame, map, part);

@@ -12,6 +12,7 @@
 #include "dynamic_slam/map/map.h"
 #include "dynamic_slam/tracking/initial_structure.h"
 #include "dynamic_slam/tracking/reference_view.h"
+#include "dynamic_slam/tracking/shutter_correction.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 
 namespace dynamic_slam {
@@ -66,11 +67,12 @@ class Initializer {
   // well.
   std::optional<InitialProposal> ChooseStructure(const TwoViewResult& result, const InitialViews& views,
                                                  int min_points);
-  void CorrectShutters(const InitialProposal& proposal, double scale, Frame* reference, Frame* last) const;
+  void MoveKeypoints(const InitialProposal& proposal, double scale, Frame* reference, Frame* last) const;
 
   Camera camera_;
   InitializerOptions options_;
   std::vector<float> octave_scales_;
+  ShutterCorrection shutter_;
   std::vector<ReferenceView> references_;  // the oldest first
   bool is_reviewing_ = false;              // of a map that was made already
   std::string reason_;

@@ -104,6 +104,21 @@ class RollingStart {
     keypoint_error_px = MedianOf(&errors);
   }
 
+  // Keypoints of both keyframes that their grids do not have where they are.
+  int Misplaced() const {
+    int misplaced = 0;
+    map_.keyframes().ForEach([&](const Keyframe& keyframe) {
+      for (uint32_t i = 0; i < keyframe.features().size(); ++i) {
+        const Keypoint& keypoint = keyframe.keypoint(i);
+        bool is_there = false;
+        keyframe.grid().ForEachInWindow(keypoint.x, keypoint.y, 0.01f, 0, SyntheticWorld::kOctaves,
+                                        [&](uint32_t j) { is_there = is_there || j == i; });
+        misplaced += !is_there;
+      }
+    });
+    return misplaced;
+  }
+
   double depth_error = 1, keypoint_error_px = 1000;
 
  private:
@@ -123,6 +138,7 @@ TEST_F(InitializerTest, ARollingShutterThatIsKnownBendsNoStart) {
   EXPECT_LT(known.depth_error, 0.02);
   EXPECT_LT(known.keypoint_error_px, 0.5);
   EXPECT_GT(unknown.keypoint_error_px, 1);
+  EXPECT_EQ(known.Misplaced(), 0) << "fusion and loops look for keypoints in the grid";
 }
 
 TEST_F(InitializerTest, ACameraThatTurnsOnlyWaits) {

@@ -47,7 +47,6 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       options_(options),
       map_(map),
       octave_scales_(map->Read()->octave_scales()),
-      bounds_(camera.IdealBounds()),
       extractor_(orb, camera),
       shutter_(camera),
       initializer_(camera, options.initializer, octave_scales_),
@@ -69,7 +68,6 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   }
   extractor_.SetFeatures(static_cast<int>(factor * orb_options_.features));
   extractor_.Extract(grey, mask, &frame_.features);
-  frame_.grid.Build(frame_.features, bounds_);
   frame_.static_probability.clear();
   frame_.ClearLandmarks();
   shutter_.Expect(PredictMotion(), last_, &frame_);
@@ -105,7 +103,7 @@ void Tracker::LookBesideBoxes() {
 
 // The local map knows the pose better than the last frame's landmarks did, and with it the motion.
 void Tracker::RefinePoseAndShutter() {
-  shutter_.Correct(last_, &frame_);
+  shutter_.Correct(last_, MedianDepthOfFrame(), &frame_);
   const int inliers = localiser_.pose_tracker().RefinePose(&frame_);
   if (inliers >= MinInliers()) inliers_ = inliers;
 }
@@ -356,7 +354,7 @@ bool Tracker::TrackFromLastFrame() {
         fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
     return false;
   }
-  shutter_.Correct(last_, &frame_);
+  if (shutter_.IsRolling()) shutter_.Correct(last_, MedianDepthOfFrame(), &frame_);
   if (!TrackLocalMap(options_.local_map_radius_px, MinInliers())) return false;
   if (shutter_.IsRolling()) RefinePoseAndShutter();
   return true;

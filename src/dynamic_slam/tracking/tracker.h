@@ -109,7 +109,6 @@ class Tracker {
   TrackerOptions options_;
   SharedMap* map_;
   std::vector<float> octave_scales_;
-  std::array<double, 4> bounds_;
   OrbExtractor extractor_;
   ShutterCorrection shutter_;
   Initializer initializer_;
