@@ -24,6 +24,14 @@ void Keyframe::BestCovisible(size_t count, int min_weight, std::vector<Covisible
   if (best->size() > count) best->resize(count);
 }
 
+void Keyframe::SetLandmark(uint32_t keypoint, LandmarkId landmark) {
+  DS_CHECK(landmarks_.at(keypoint).IsValid() != landmark.IsValid(), "keyframe={} keypoint={}", id_.value(),
+           keypoint);
+  landmarks_[keypoint] = landmark;
+  has_landmark_[keypoint / 64] ^= uint64_t{1} << (keypoint % 64);
+  landmark_count_ += landmark.IsValid() ? 1 : -1;
+}
+
 void Keyframe::ChangeWeight(KeyframeId other, int change) {
   const auto position =
       std::lower_bound(covisible_.begin(), covisible_.end(), other,

@@ -75,18 +75,16 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
 
   is_taken_.resize((map.landmarks().CreatedCount() + 63) / 64 + 1);
   for (const KeyframeId keyframe : keyframes_) {
-    const std::vector<LandmarkId>& landmarks = map.keyframes().At(keyframe).landmarks();
-    fresh_.resize(std::max(fresh_.size(), landmarks.size()));
+    const Keyframe& seen_from = map.keyframes().At(keyframe);
+    fresh_.resize(std::max(fresh_.size(), seen_from.landmarks().size()));
     size_t count = 0;
-    // Which keypoints have a landmark, and which landmark is new, is hard to predict: no branches.
-    for (const LandmarkId id : landmarks) {
-      const uint64_t is_valid = id.IsValid();
-      const uint32_t at = id.IsValid() ? id.value() : 0;
-      uint64_t& bits = is_taken_[at / 64];
+    // Which landmark is new is hard to predict: no branch.
+    seen_from.ForEachLandmark([&](uint32_t, LandmarkId id) {
+      uint64_t& bits = is_taken_[id.value() / 64];
       fresh_[count] = id;
-      count += is_valid & ~(bits >> (at % 64));
-      bits |= is_valid << (at % 64);
-    }
+      count += 1 & ~(bits >> (id.value() % 64));
+      bits |= uint64_t{1} << (id.value() % 64);
+    });
     view->ids.insert(view->ids.end(), fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(count));
   }
   landmarks_.clear();

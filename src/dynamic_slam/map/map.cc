@@ -148,8 +148,7 @@ void Map::MergePart(PartId from, PartId into, const Sim3& into_from_from) {
 void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id) {
   Keyframe& keyframe = keyframes_.At(keyframe_id);
   Landmark& landmark = landmarks_.At(landmark_id);
-  DS_CHECK(keypoint < keyframe.landmarks_.size(), "keypoint={}", keypoint);
-  DS_CHECK(!keyframe.landmarks_[keypoint].IsValid(), "keyframe={} keypoint={}", keyframe_id.value(),
+  DS_CHECK(!keyframe.landmarks_.at(keypoint).IsValid(), "keyframe={} keypoint={}", keyframe_id.value(),
            keypoint);
   const auto position = FindObservation(landmark.observations_, keyframe_id);
   DS_CHECK(position == landmark.observations_.end() || position->keyframe != keyframe_id,
@@ -159,20 +158,14 @@ void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id
     keyframes_.At(other.keyframe).ChangeWeight(keyframe_id, 1);
   }
   landmark.observations_.insert(position, {keyframe_id, keypoint});
-  keyframe.landmarks_[keypoint] = landmark_id;
-  ++keyframe.landmark_count_;
+  keyframe.SetLandmark(keypoint, landmark_id);
 }
 
 void Map::LinkAll(LandmarkId id, std::vector<Observation> observations) {
   Landmark& landmark = landmarks_.At(id);
   DS_CHECK(landmark.observations_.empty(), "landmark={}", id.value());
-  for (const Observation& observation : observations) {
-    Keyframe& keyframe = keyframes_.At(observation.keyframe);
-    DS_CHECK(!keyframe.landmarks_.at(observation.keypoint).IsValid(), "keyframe={} keypoint={}",
-             observation.keyframe.value(), observation.keypoint);
-    keyframe.landmarks_[observation.keypoint] = id;
-    ++keyframe.landmark_count_;
-  }
+  for (const Observation& observation : observations)
+    keyframes_.At(observation.keyframe).SetLandmark(observation.keypoint, id);
   landmark.observations_ = std::move(observations);
 }
 
@@ -181,12 +174,11 @@ void Map::CountCovisibility() {
   std::vector<KeyframeId> others;
   keyframes_.ForEach([&](Keyframe& keyframe) {
     others.clear();
-    for (const LandmarkId landmark : keyframe.landmarks_) {
-      if (!landmark.IsValid()) continue;
+    keyframe.ForEachLandmark([&](uint32_t, LandmarkId landmark) {
       for (const Observation& other : landmarks_.At(landmark).observations_) {
         if (shared[other.keyframe.value()]++ == 0) others.push_back(other.keyframe);
       }
-    }
+    });
     std::sort(others.begin(), others.end());
     keyframe.covisible_.clear();
     for (const KeyframeId other : others) {
@@ -201,8 +193,7 @@ void Map::Unlink(KeyframeId keyframe_id, uint32_t keypoint) {
   const LandmarkId landmark_id = keyframe.landmarks_.at(keypoint);
   Landmark& landmark = landmarks_.At(landmark_id);
   landmark.observations_.erase(FindObservation(landmark.observations_, keyframe_id));
-  keyframe.landmarks_[keypoint] = LandmarkId();
-  --keyframe.landmark_count_;
+  keyframe.SetLandmark(keypoint, LandmarkId());
   for (const Observation& other : landmark.observations_) {
     keyframe.ChangeWeight(other.keyframe, -1);
     keyframes_.At(other.keyframe).ChangeWeight(keyframe_id, -1);
@@ -214,8 +205,7 @@ void Map::EraseLandmark(LandmarkId id) {
   const std::vector<Observation> observations = std::move(landmarks_.At(id).observations_);
   for (size_t i = 0; i < observations.size(); ++i) {
     Keyframe& keyframe = keyframes_.At(observations[i].keyframe);
-    keyframe.landmarks_[observations[i].keypoint] = LandmarkId();
-    --keyframe.landmark_count_;
+    keyframe.SetLandmark(observations[i].keypoint, LandmarkId());
     for (size_t j = 0; j < observations.size(); ++j) {
       if (j != i) keyframe.ChangeWeight(observations[j].keyframe, -1);
     }
@@ -340,10 +330,9 @@ double Map::UnitOf(KeyframeId reference) const {
 double Map::MedianDepth(KeyframeId id) const {
   const Keyframe& keyframe = keyframes_.At(id);
   std::vector<double> depths;
-  for (const LandmarkId landmark : keyframe.landmarks()) {
-    if (landmark.IsValid())
-      depths.push_back((keyframe.cam_from_world() * landmarks_.At(landmark).position()).z());
-  }
+  keyframe.ForEachLandmark([&](uint32_t, LandmarkId landmark) {
+    depths.push_back((keyframe.cam_from_world() * landmarks_.At(landmark).position()).z());
+  });
   if (depths.empty()) return 0;
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
@@ -398,7 +387,9 @@ std::vector<std::string> Map::Validate() const {
         keyframes_.At(origins_[keyframe.part().value()]).part() != keyframe.part()) {
       problems.push_back(fmt::format("keyframe {}: its part has no origin", id));
     }
-    if (count != keyframe.LandmarkCount())
+    int listed = 0;
+    keyframe.ForEachLandmark([&](uint32_t, LandmarkId landmark) { listed += landmark.IsValid() ? 1 : 0; });
+    if (count != keyframe.LandmarkCount() || count != listed)
       problems.push_back(fmt::format("keyframe {}: counts its landmarks wrongly", id));
     for (const CovisibleKeyframe& other : keyframe.covisible()) {
       const auto weight = weights.find({keyframe.id(), other.id});

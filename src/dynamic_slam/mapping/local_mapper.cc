@@ -94,11 +94,10 @@ void LocalMapper::CullMovedLandmarks(KeyframeId current, Map* map, MappingResult
   const auto neighbours =
       map->keyframes().At(current).BestCovisible(static_cast<size_t>(options_.fusion_neighbours));
   for (const CovisibleKeyframe& neighbour : neighbours) {
-    for (const LandmarkId id : map->keyframes().At(neighbour.id).landmarks()) {
-      if (!id.IsValid()) continue;
+    map->keyframes().At(neighbour.id).ForEachLandmark([&](uint32_t, LandmarkId id) {
       const Landmark& landmark = map->landmarks().At(id);
       if (landmark.is_from_file && landmark.FoundRatio() < kMinFoundRatio) moved.push_back(id);
-    }
+    });
   }
   for (const LandmarkId id : moved) {
     if (!map->landmarks().Contains(id)) continue;
@@ -176,18 +175,17 @@ bool LocalMapper::CullRedundantKeyframes(KeyframeId current, MappingResult* resu
 }
 
 bool LocalMapper::IsRedundant(const Map& map, const Keyframe& keyframe) const {
-  int landmarks = 0, redundant = 0;
-  for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
-    if (!keyframe.landmarks()[i].IsValid()) continue;
-    ++landmarks;
+  int redundant = 0;
+  keyframe.ForEachLandmark([&](uint32_t keypoint, LandmarkId landmark) {
     int views = 0;
-    for (const Observation& other : map.landmarks().At(keyframe.landmarks()[i]).observations()) {
+    for (const Observation& other : map.landmarks().At(landmark).observations()) {
       if (other.keyframe == keyframe.id()) continue;
       views += map.keyframes().At(other.keyframe).keypoint(other.keypoint).octave <=
-               keyframe.keypoint(i).octave + 1;
+               keyframe.keypoint(keypoint).octave + 1;
     }
     redundant += views >= kRedundantViews;
-  }
+  });
+  const int landmarks = keyframe.LandmarkCount();
   return landmarks > 0 && redundant > options_.redundant_ratio * landmarks;
 }
 

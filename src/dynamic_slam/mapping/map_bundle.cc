@@ -34,11 +34,11 @@ class MapBundle {
   }
 
   void AddLandmarksOf(const Map& map, KeyframeId id) {
-    for (const LandmarkId landmark : map.keyframes().At(id).landmarks()) {
-      if (!landmark.IsValid() || seen_[landmark.value()] != 0) continue;
+    map.keyframes().At(id).ForEachLandmark([&](uint32_t, LandmarkId landmark) {
+      if (seen_[landmark.value()] != 0) return;
       seen_[landmark.value()] = 1;
       landmarks_.push_back(landmark);
-    }
+    });
   }
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 

@@ -23,6 +23,11 @@ constexpr double kMinDepth = 1e-9;  // of a point in front of the camera, in uni
 // A round ends when the Newton decrement falls below this: the squared length of the step in standard
 // deviations of the pose, which does not depend on the scale of the map.
 constexpr double kSmallDecrement = 1e-6;
+// A round with a kernel only names inliers: a tenth of a standard deviation is near enough.
+constexpr double kSmallRobustDecrement = 1e-2;
+
+// What is farther away has no place in a map, and its square in the sums no room.
+constexpr double kMaxCoordinate = 1e15;
 
 // The Gauss-Newton system at one pose. cost = sum of weight * rho(error^2), in squared sigmas.
 struct NormalEquations {
@@ -125,9 +130,9 @@ bool SolveStep(const NormalEquations& normal, double damping, Vector6* step) {
 }
 
 bool IsUsable(const PoseObservations& o, size_t i) {
-  const double sum =
-      o.x[i] + o.y[i] + o.z[i] + o.spread_x[i] + o.spread_y[i] + o.spread_z[i] + o.u[i] + o.v[i];
-  return std::isfinite(sum) && o.weight[i] > 0 && std::isfinite(o.weight[i]) && o.inverse_sigma_px[i] > 0 &&
+  const double sum = std::abs(o.x[i]) + std::abs(o.y[i]) + std::abs(o.z[i]) + std::abs(o.spread_x[i]) +
+                     std::abs(o.spread_y[i]) + std::abs(o.spread_z[i]) + std::abs(o.u[i]) + std::abs(o.v[i]);
+  return sum < kMaxCoordinate && o.weight[i] > 0 && std::isfinite(o.weight[i]) && o.inverse_sigma_px[i] > 0 &&
          std::isfinite(o.inverse_sigma_px[i]);
 }
 
@@ -137,6 +142,12 @@ void PoseObservations::Clear() {
   for (std::vector<double>* array :
        {&x, &y, &z, &spread_x, &spread_y, &spread_z, &u, &v, &inverse_sigma_px, &weight})
     array->clear();
+}
+
+void PoseObservations::Discard(size_t i) {
+  for (std::vector<double>* array : {&x, &y, &spread_x, &spread_y, &spread_z, &u, &v, &weight})
+    (*array)[i] = 0;
+  z[i] = inverse_sigma_px[i] = 1;
 }
 
 void PoseObservations::Add(const Eigen::Vector3d& x_in_world, const Eigen::Vector2d& ideal_px,
@@ -170,10 +181,10 @@ void PoseOptimizer::Optimize(const PoseObservations& observations, const Rigid3&
   give_up();
   if (!initial_cam_from_world.IsFinite()) return;
 
+  Copy(observations);
   for (size_t i = 0; i < observations.size(); ++i) {
     const Eigen::Vector3d x_in_world(observations.x[i], observations.y[i], observations.z[i]);
-    estimate->is_inlier[i] =
-        IsUsable(observations, i) && (initial_cam_from_world * x_in_world).z() > kMinDepth;
+    estimate->is_inlier[i] = is_usable_[i] != 0 && (initial_cam_from_world * x_in_world).z() > kMinDepth;
   }
 
   const int rounds = options_.robust_rounds + options_.plain_rounds;
@@ -201,17 +212,21 @@ void PoseOptimizer::Optimize(const PoseObservations& observations, const Rigid3&
   estimate->converged = true;
 }
 
-int PoseOptimizer::Activate(const PoseObservations& all, const std::vector<uint8_t>& is_inlier) {
-  active_.Clear();
+void PoseOptimizer::Copy(const PoseObservations& all) {
+  active_ = all;
+  is_usable_.resize(all.size());
   for (size_t i = 0; i < all.size(); ++i) {
-    if (is_inlier[i]) {
-      active_.Add({all.x[i], all.y[i], all.z[i]}, {all.u[i], all.v[i]}, all.inverse_sigma_px[i],
-                  all.weight[i], {all.spread_x[i], all.spread_y[i], all.spread_z[i]});
-    }
+    is_usable_[i] = IsUsable(all, i);
+    if (is_usable_[i] == 0) active_.Discard(i);
   }
-  const int count = static_cast<int>(active_.size());
-  while (active_.size() % kLanes != 0) {
-    active_.Add({active_.x[0], active_.y[0], active_.z[0]}, {active_.u[0], active_.v[0]}, 1.0, 0.0);
+  while (active_.size() % kLanes != 0) active_.Add({0, 0, 1}, {0, 0}, 1.0, 0.0);
+}
+
+int PoseOptimizer::Activate(const PoseObservations& all, const std::vector<uint8_t>& is_inlier) {
+  int count = 0;
+  for (size_t i = 0; i < all.size(); ++i) {
+    active_.weight[i] = is_inlier[i] != 0 ? all.weight[i] : 0;
+    count += is_inlier[i];
   }
   return count;
 }
@@ -221,6 +236,7 @@ bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
   NormalEquations current, next;
   Accumulate(active_, *cam_from_world, fx_, fy_, cx_, cy_, delta_squared, &current);
   if (!std::isfinite(current.cost)) return false;
+  const double small_decrement = robust ? kSmallRobustDecrement : kSmallDecrement;
   double damping = 0;  // Gauss-Newton while it works, Levenberg-Marquardt when it does not
   for (int iteration = 0; iteration < options_.iterations_per_round; ++iteration) {
     Vector6 step;
@@ -230,7 +246,7 @@ bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
       continue;
     }
     const Rigid3 candidate = Rigid3(ExpSo3(step.head<3>()), step.tail<3>()) * *cam_from_world;
-    if (-step.dot(current.gradient) < kSmallDecrement) {
+    if (-step.dot(current.gradient) < small_decrement) {
       *cam_from_world = candidate;  // so small a step can do no harm: its cost is not worth asking for
       break;
     }
@@ -257,7 +273,7 @@ bool PoseOptimizer::Classify(const PoseObservations& all, double chi2, PoseEstim
     const double du = fx_ * x_in_cam.x() / x_in_cam.z() + cx_ - all.u[i];
     const double dv = fy_ * x_in_cam.y() / x_in_cam.z() + cy_ - all.v[i];
     const double e2 = (du * du + dv * dv) * all.inverse_sigma_px[i] * all.inverse_sigma_px[i];
-    const bool inlier = x_in_cam.z() > kMinDepth && e2 <= chi2 && IsUsable(all, i);
+    const bool inlier = x_in_cam.z() > kMinDepth && e2 <= chi2 && is_usable_[i] != 0;
     changed |= inlier != (estimate->is_inlier[i] != 0);
     estimate->is_inlier[i] = inlier;
     if (inlier) {

@@ -25,6 +25,8 @@ struct PoseObservations {
   void Clear();
   void Add(const Eigen::Vector3d& x_in_world, const Eigen::Vector2d& ideal_px, double inverse_sigma,
            double trust = 1.0, const Eigen::Vector3d& spread_in_world = Eigen::Vector3d::Zero());
+  // Takes an observation's numbers away, whatever they are: it has no weight then.
+  void Discard(size_t i);
   size_t size() const { return x.size(); }
 };
 
@@ -77,10 +79,14 @@ class PoseOptimizer {
                 PoseEstimate* estimate);
 
  private:
-  // Copies the observations with an inlier flag into active_, padded to whole blocks; returns their number.
+  // Copies the observations into active_, padded to whole blocks; those that cannot be used get no weight.
+  void Copy(const PoseObservations& all);
+
+  // Gives the inliers among active_ their weights and all others none; returns their number.
   int Activate(const PoseObservations& all, const std::vector<uint8_t>& is_inlier);
 
-  // Takes Levenberg-Marquardt steps on active_ until they are small. False: the geometry is degenerate.
+  // Takes Levenberg-Marquardt steps on active_ until they are small, in a robust round until they are
+  // small enough to name inliers. False: the geometry is degenerate.
   bool Descend(bool robust, Rigid3* cam_from_world) const;
 
   // Names the inliers among all observations at this pose and counts them; true if a flag changed.
@@ -89,6 +95,7 @@ class PoseOptimizer {
   double fx_, fy_, cx_, cy_;  // px
   PoseOptimizerOptions options_;
   PoseObservations active_;
+  std::vector<uint8_t> is_usable_;
 };
 
 }  // namespace dynamic_slam

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "dynamic_slam/base/trace.h"
+
 namespace dynamic_slam {
 namespace {
 
 // A pose that comes from descriptors alone is less exact than a prediction.
 constexpr double kRelocalisedSearch = 3.0;
-
-constexpr int kLocalMapPasses = 2;
 
 }  // namespace
 
@@ -17,9 +17,18 @@ MapLocaliser::MapLocaliser(const Camera& camera, const TrackerOptions& options,
                            std::vector<float> octave_scales, SharedMap* map)
     : options_(options), map_(map), pose_tracker_(camera, options, std::move(octave_scales)) {}
 
+void MapLocaliser::LookAround(const Frame& frame) {
+  DS_TRACE("tracking/view");
+  view_builder_.Build(*map_->Read(), frame.landmarks, options_.local_keyframes, &view_);
+}
+
+int MapLocaliser::MatchView(double radius_px, Frame* frame) {
+  return view_.reference.IsValid() ? pose_tracker_.TrackLocalMap(view_, radius_px, frame, &in_view_) : 0;
+}
+
 int MapLocaliser::TrackLocalMap(double radius_px, Frame* frame) {
-  view_builder_.Build(*map_->Read(), frame->landmarks, options_.local_keyframes, &view_);
-  return MatchView(radius_px, frame);
+  LookAround(*frame);
+  return MatchViewTwice(radius_px, frame);
 }
 
 int MapLocaliser::TrackNear(KeyframeId keyframe, const Rigid3& cam_from_world, double radius_px,
@@ -30,17 +39,12 @@ int MapLocaliser::TrackNear(KeyframeId keyframe, const Rigid3& cam_from_world, d
     const auto map = map_->Read();
     view_builder_.Build(*map, map->keyframes().At(keyframe).landmarks(), options_.local_keyframes, &view_);
   }
-  return MatchView(radius_px, frame);
+  return MatchViewTwice(radius_px, frame);
 }
 
-int MapLocaliser::MatchView(double radius_px, Frame* frame) {
-  if (!view_.reference.IsValid()) return 0;
-  int inliers = 0;
-  // The second time from the better pose finds what the first one just missed.
-  for (int pass = 0; pass < kLocalMapPasses; ++pass) {
-    inliers = pose_tracker_.TrackLocalMap(view_, radius_px, frame, &in_view_);
-  }
-  return inliers;
+int MapLocaliser::MatchViewTwice(double radius_px, Frame* frame) {
+  MatchView(radius_px, frame);
+  return MatchView(radius_px, frame);
 }
 
 void MapLocaliser::Anchor(Frame* frame) const {

@@ -23,8 +23,14 @@ class MapLocaliser {
   MapLocaliser(const Camera& camera, const TrackerOptions& options, std::vector<float> octave_scales,
                SharedMap* map);
 
-  // Matches the landmarks of the keyframes about those of the frame. Returns the inliers; 0 when the map has
-  // none of the frame's landmarks.
+  // Takes the landmarks of the keyframes about those of the frame into view.
+  void LookAround(const Frame& frame);
+
+  // Matches what is in view. Returns the inliers; 0 when the map has none of the frame's landmarks. A second
+  // time, from the better pose, it finds what the first one just missed.
+  int MatchView(double radius_px, Frame* frame);
+
+  // Looks around and matches twice.
   int TrackLocalMap(double radius_px, Frame* frame);
 
   // The same about the pose that is expected, from the landmarks near a keyframe.
@@ -49,7 +55,7 @@ class MapLocaliser {
   const std::vector<uint8_t>& in_view() const { return in_view_; }  // its entries that should be visible
 
  private:
-  int MatchView(double radius_px, Frame* frame);
+  int MatchViewTwice(double radius_px, Frame* frame);
   void FindCandidates(const Frame& frame);
 
   TrackerOptions options_;

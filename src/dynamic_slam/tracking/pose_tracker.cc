@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/map/static_evidence.h"
 
 namespace dynamic_slam {
@@ -34,6 +35,7 @@ int PoseTracker::MaxDistance(const Frame& frame, uint32_t keypoint) const {
 
 int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_from_world, double radius_px,
                                 Frame* frame) {
+  DS_TRACE("tracking/last frame");
   frame->ClearLandmarks();
   TakeUnusable(*frame);
   candidates_.clear();
@@ -161,6 +163,7 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     observed_keypoints_.push_back(i);
   }
   rejected_.clear();
+  DS_TRACE("tracking/pose");
   optimizer_.Optimize(observations_, initial_cam_from_world, &estimate_);
   if (!estimate_.converged) return 0;
   frame->cam_from_world = estimate_.cam_from_world;

@@ -36,9 +36,6 @@ class PoseTracker {
   // Landmarks that were matched and did not fit the last pose that was found.
   const std::vector<LandmarkId>& rejected() const { return rejected_; }
 
-  // Optimises the pose once more over all the frame's landmarks, when its keypoints have moved.
-  int RefinePose(Frame* frame) { return OptimisePose(frame->cam_from_world, frame); }
-
  private:
   // Optimises the pose over all the frame's landmarks from `initial`; takes away those that do not fit.
   int OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame);

@@ -101,11 +101,8 @@ void Tracker::LookBesideBoxes() {
   extractor_.SetMinThreshold(is_starved_ ? std::min(usual, orb_options_.fast_threshold_starved) : usual);
 }
 
-// The local map knows the pose better than the last frame's landmarks did, and with it the motion.
-void Tracker::RefinePoseAndShutter() {
-  shutter_.Correct(last_, MedianDepthOfFrame(), &frame_);
-  const int inliers = localiser_.pose_tracker().RefinePose(&frame_);
-  if (inliers >= MinInliers()) inliers_ = inliers;
+void Tracker::CorrectShutter() {
+  if (shutter_.IsRolling()) shutter_.Correct(last_, MedianDepthOfFrame(), &frame_);
 }
 
 TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting) {
@@ -354,10 +351,8 @@ bool Tracker::TrackFromLastFrame() {
         fmt::format("lost: {} landmarks of the last frame found < {}", inliers, options_.min_motion_inliers);
     return false;
   }
-  if (shutter_.IsRolling()) shutter_.Correct(last_, MedianDepthOfFrame(), &frame_);
-  if (!TrackLocalMap(options_.local_map_radius_px, MinInliers())) return false;
-  if (shutter_.IsRolling()) RefinePoseAndShutter();
-  return true;
+  CorrectShutter();
+  return TrackLocalMap();
 }
 
 int Tracker::MinInliers() const {
@@ -368,9 +363,15 @@ int Tracker::MinInliers() const {
       std::lround(std::max(1.0, keypoints / 1000) * (options_.min_inliers + std::max(more, 0.0))));
 }
 
-bool Tracker::TrackLocalMap(double radius_px, int min_inliers) {
-  inliers_ = localiser_.TrackLocalMap(radius_px, &frame_);
+bool Tracker::TrackLocalMap() {
+  DS_TRACE("tracking/local map");
+  localiser_.LookAround(frame_);
   revision_ = localiser_.view().revision;
+  localiser_.MatchView(options_.local_map_radius_px, &frame_);
+  // The local map knows the pose better than the last frame's landmarks did, and with it the motion.
+  CorrectShutter();
+  inliers_ = localiser_.MatchView(options_.local_map_radius_px, &frame_);
+  const int min_inliers = MinInliers();
   if (inliers_ >= min_inliers) return true;
   reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
   return false;

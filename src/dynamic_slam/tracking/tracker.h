@@ -88,7 +88,7 @@ class Tracker {
   // Erases the part of the map in which the camera is, or was last.
   void ErasePart(TrackingResult* result);
   void LookBesideBoxes();
-  void RefinePoseAndShutter();
+  void CorrectShutter();
   void ForgetPose();
   PartId PartOfFrame() const;
   int KeyframesIn(PartId part) const;
@@ -96,7 +96,7 @@ class Tracker {
   bool TrackFromLastFrame();
   bool Relocalise();
   int MinInliers() const;
-  bool TrackLocalMap(double radius_px, int min_inliers);
+  bool TrackLocalMap();
   void RefreshLastFrame();
   std::optional<Rigid3> PredictMotion() const;
   double MedianDepthOfFrame();
