@@ -128,14 +128,16 @@ void RunProfiles(const ProfileArguments& arguments, int* exit_code) {
   std::vector<ProfileRuns> all;
   for (const std::string& profile : arguments.profiles) {
     all.emplace_back().name = profile;
-    for (int run = 1; run <= arguments.runs; ++run) units.push_back(MakeUnit(arguments, profile, run));
-    ApplyArguments(units.back().arguments, &all.back().options);
+    ApplyArguments(MakeUnit(arguments, profile, 1).arguments, &all.back().options);
+  }
+  // In turns, so that a time in which the machine is slow is that of all profiles.
+  for (int run = 1; run <= arguments.runs; ++run) {
+    for (const std::string& profile : arguments.profiles) units.push_back(MakeUnit(arguments, profile, run));
   }
   PrepareOutputFolder(out);
   RunConsole console(arguments.quiet);
   const std::vector<UnitOutcome> outcomes = RunUnits(out, units, 1, &console);
-  for (size_t i = 0; i < units.size(); ++i)
-    all[i / static_cast<size_t>(arguments.runs)].outcomes.push_back(&outcomes[i]);
+  for (size_t i = 0; i < units.size(); ++i) all[i % all.size()].outcomes.push_back(&outcomes[i]);
   const Table table = MakeTable(all, arguments);
   ReportPage page{.title = "Profiles on " + ShortName(arguments.source),
                   .subtitle = fmt::format("{} · detector {} · {} runs", arguments.source, arguments.detector,
