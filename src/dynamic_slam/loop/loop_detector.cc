@@ -168,9 +168,7 @@ std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
 std::vector<Sim3Match> LoopDetector::MatchLandmarks(const Map& map, const Keyframe& keyframe,
                                                     const Keyframe& candidate) const {
   std::vector<uint32_t> own;
-  for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
-    if (keyframe.landmarks()[i].IsValid()) own.push_back(i);
-  }
+  keyframe.ForEachLandmark([&](uint32_t keypoint, LandmarkId) { own.push_back(keypoint); });
   // The landmarks about the candidate, as if they were one image.
   const std::vector<LandmarkId> landmarks = LandmarksAbout(map, candidate, kMatchedKeyframes);
   FeatureSet place;

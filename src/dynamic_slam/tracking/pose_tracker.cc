@@ -67,9 +67,7 @@ int PoseTracker::TrackFromFrame(const Frame& last, const Rigid3& predicted_cam_f
 int PoseTracker::TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Random& random, Frame* frame) {
   frame->ClearLandmarks();
   std::vector<uint32_t> with_landmark, usable;
-  for (uint32_t i = 0; i < keyframe.landmarks().size(); ++i) {
-    if (keyframe.landmarks()[i].IsValid()) with_landmark.push_back(i);
-  }
+  keyframe.ForEachLandmark([&](uint32_t keypoint, LandmarkId) { with_landmark.push_back(keypoint); });
   for (uint32_t i = 0; i < frame->features.size(); ++i) {
     if (frame->StaticProbability(i) >= kMinStaticProbability) usable.push_back(i);
   }
