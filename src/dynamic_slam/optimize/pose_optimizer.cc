@@ -23,8 +23,6 @@ constexpr double kMinDepth = 1e-9;  // of a point in front of the camera, in uni
 // A round ends when the Newton decrement falls below this: the squared length of the step in standard
 // deviations of the pose, which does not depend on the scale of the map.
 constexpr double kSmallDecrement = 1e-6;
-// A round with a kernel only names inliers: a tenth of a standard deviation is near enough.
-constexpr double kSmallRobustDecrement = 1e-2;
 
 // What is farther away has no place in a map, and its square in the sums no room.
 constexpr double kMaxCoordinate = 1e15;
@@ -236,7 +234,6 @@ bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
   NormalEquations current, next;
   Accumulate(active_, *cam_from_world, fx_, fy_, cx_, cy_, delta_squared, &current);
   if (!std::isfinite(current.cost)) return false;
-  const double small_decrement = robust ? kSmallRobustDecrement : kSmallDecrement;
   double damping = 0;  // Gauss-Newton while it works, Levenberg-Marquardt when it does not
   for (int iteration = 0; iteration < options_.iterations_per_round; ++iteration) {
     Vector6 step;
@@ -246,7 +243,7 @@ bool PoseOptimizer::Descend(bool robust, Rigid3* cam_from_world) const {
       continue;
     }
     const Rigid3 candidate = Rigid3(ExpSo3(step.head<3>()), step.tail<3>()) * *cam_from_world;
-    if (-step.dot(current.gradient) < small_decrement) {
+    if (-step.dot(current.gradient) < kSmallDecrement) {
       *cam_from_world = candidate;  // so small a step can do no harm: its cost is not worth asking for
       break;
     }

@@ -85,8 +85,7 @@ class PoseOptimizer {
   // Gives the inliers among active_ their weights and all others none; returns their number.
   int Activate(const PoseObservations& all, const std::vector<uint8_t>& is_inlier);
 
-  // Takes Levenberg-Marquardt steps on active_ until they are small, in a robust round until they are
-  // small enough to name inliers. False: the geometry is degenerate.
+  // Takes Levenberg-Marquardt steps on active_ until they are small. False: the geometry is degenerate.
   bool Descend(bool robust, Rigid3* cam_from_world) const;
 
   // Names the inliers among all observations at this pose and counts them; true if a flag changed.
