@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,7 +41,7 @@ class KeypointGrid {
           return (dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
                  (entry.octave <= max_octave);
         },
-        fn);
+        [&](int) __attribute__((always_inline)) { return Span{x - radius_px, x + radius_px}; }, fn);
   }
 
   // The same for those at a distance <= radius_px from the line between two ideal pixels.
@@ -51,6 +53,7 @@ class KeypointGrid {
     const Eigen::Vector2f along = b - a;
     const float length_squared = along.squaredNorm();
     const float over = length_squared > 0 ? 1 / length_squared : 0;
+    const float reach_px = radius_px + 0.5f;  // more than the rounding of what follows
     ForEachInRectangle(
         std::min(a.x(), b.x()) - radius_px, std::min(a.y(), b.y()) - radius_px,
         std::max(a.x(), b.x()) + radius_px, std::max(a.y(), b.y()) + radius_px,
@@ -60,6 +63,18 @@ class KeypointGrid {
           const float off_x = dx - t * along.x(), off_y = dy - t * along.y();
           return (off_x * off_x + off_y * off_y <= radius_squared) & (entry.octave >= min_octave) &
                  (entry.octave <= max_octave);
+        },
+        // Of a line across rows and columns, a row of cells is near to a part only.
+        [&](int row) __attribute__((always_inline)) {
+          Span t{0, 1};
+          if (std::abs(along.y()) > 1) {
+            const float enters = (RowTop(row) - reach_px - a.y()) / along.y();
+            const float leaves = (RowTop(row + 1) + reach_px - a.y()) / along.y();
+            t = {std::clamp(std::min(enters, leaves), 0.0f, 1.0f),
+                 std::clamp(std::max(enters, leaves), 0.0f, 1.0f)};
+          }
+          const float from = a.x() + t.min * along.x(), to = a.x() + t.max * along.x();
+          return Span{std::min(from, to) - reach_px, std::max(from, to) + reach_px};
         },
         fn);
   }
@@ -71,21 +86,27 @@ class KeypointGrid {
     int octave;
   };
 
-  // Of the keypoints in the cells that touch the rectangle, those of which is_inside(entry) tells 1.
-  template <class IsInside, class Fn>
+  struct Span {
+    float min, max;
+  };
+
+  // Of the keypoints in the cells that touch the rectangle, and in each row of cells touch x_of_row(row),
+  // those of which is_inside(entry) tells 1.
+  template <class IsInside, class XOfRow, class Fn>
   __attribute__((always_inline)) void ForEachInRectangle(float min_x, float min_y, float max_x, float max_y,
-                                                         IsInside&& is_inside, Fn&& fn) const {
+                                                         IsInside&& is_inside, XOfRow&& x_of_row,
+                                                         Fn&& fn) const {
     if (entries_.empty() || !(min_x <= max_x) || !(min_y <= max_y)) return;
-    const int first_column = Column(min_x), last_column = Column(max_x);
     const int first_row = Row(min_y), last_row = Row(max_y);
     // Where keypoints are is hard to predict, so they are first found without a branch, then visited.
     constexpr size_t kMost = 128;
     uint32_t found[kMost];
     size_t count = 0;
     for (int row = first_row; row <= last_row; ++row) {
+      const Span x = x_of_row(row);
       // The cells of a row are neighbours in memory, so their keypoints are one range.
-      const uint32_t begin = cell_begin_[row * columns_ + first_column];
-      const uint32_t end = cell_begin_[row * columns_ + last_column + 1];
+      const uint32_t begin = cell_begin_[row * columns_ + Column(x.min)];
+      const uint32_t end = cell_begin_[row * columns_ + Column(x.max) + 1];
       for (uint32_t i = begin; i < end; ++i) {
         const Entry& entry = entries_[i];
         found[count] = entry.index;
@@ -97,6 +118,13 @@ class KeypointGrid {
       }
     }
     for (size_t i = 0; i < count; ++i) fn(found[i]);
+  }
+
+  // Where a row of cells begins, ideal px. The first and the last row hold all that is above and below.
+  float RowTop(int row) const {
+    if (row == 0) return -std::numeric_limits<float>::infinity();
+    if (row == rows_) return std::numeric_limits<float>::infinity();
+    return min_y_ + kCellSizePx * static_cast<float>(row);
   }
 
   // Clamped before the conversion: far outside, the float does not fit an int.

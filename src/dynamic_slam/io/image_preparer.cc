@@ -193,23 +193,26 @@ void ImagePreparer::Convert(const cv::Mat& raw, int channels, cv::Mat* prepared)
     throw InputError("image", refusal, "Check the camera and the options image.* against the images.");
   }
   cv::Mat image = raw(crop_);
-  const auto convert = [this, &image](int code) {
-    cv::cvtColor(image, converted_, code);
-    image = converted_;
-  };
   const bool is_grey = channels == 1;
+  int code = -1;
   if (bayer_to_grey_ >= 0) {
-    convert(is_grey ? bayer_to_grey_ : bayer_to_colour_);
+    code = is_grey ? bayer_to_grey_ : bayer_to_colour_;
   } else if (image.channels() == 4) {
-    convert(is_grey ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGRA2BGR);
+    code = is_grey ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGRA2BGR;
   } else if (image.channels() != channels) {
-    convert(is_grey ? cv::COLOR_BGR2GRAY : cv::COLOR_GRAY2BGR);
+    code = is_grey ? cv::COLOR_BGR2GRAY : cv::COLOR_GRAY2BGR;
   }
 
   const cv::Size size(camera_.width, camera_.height);
   const double white = options_.white_level > 0  ? options_.white_level
                        : image.depth() == CV_16U ? std::numeric_limits<uint16_t>::max()
                                                  : std::numeric_limits<uint8_t>::max();
+  if (code >= 0) {
+    const bool is_all = image.size() == size && image.depth() == CV_8U && white == 255;
+    cv::cvtColor(image, is_all ? *prepared : converted_, code);
+    if (is_all) return;
+    image = converted_;
+  }
   if (image.size() == size) {
     image.convertTo(*prepared, CV_8U, 255 / white);  // a plain copy of 8 bits
   } else {

@@ -91,10 +91,9 @@ FrameResult SlamSystem::ProcessPrepared(double timestamp_s, const cv::Mat& image
   result.id = FrameId(frame_count_++);
   double asking_ms = 0;  // inline, the detector itself
   if (detection_.has_value() && detection_->Begin(result.id, timestamp_s)) {
-    cv::Mat colour;  // the detector keeps it
-    preparer_.PrepareColour(image, &colour);
+    preparer_.PrepareColour(image, &colour_);
     const auto asked = std::chrono::steady_clock::now();
-    detection_->Submit(result.id, timestamp_s, colour);
+    detection_->Submit(result.id, timestamp_s, colour_);
     asking_ms = MillisecondsSince(asked);
   }
   tracker_.Extract(result.id, timestamp_s, grey_, mask);
@@ -287,6 +286,7 @@ void SlamSystem::Reset() {
   executor_->Cancel();
   tracker_.Reset();
   if (detection_.has_value()) detection_->Reset();
+  colour_.release();  // a detector that hangs may still read it
   tracked_.clear();
   if (backfiller_.has_value()) backfiller_->Clear();
   *mapping_report_.Write() = MappingReport();

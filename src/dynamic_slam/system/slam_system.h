@@ -173,6 +173,7 @@ class SlamSystem {
   std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work
+  cv::Mat colour_;              // that of the last question to the detector; free once that is answered
   std::exception_ptr failure_;  // of Process: what it left half done is not gone on with
   bool is_stopped_ = false;
   std::unique_ptr<Executor> executor_;  // last: its tasks use all the others

@@ -305,9 +305,7 @@ void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
     const Box& box = object.box.box;
     suspects_.push_back({box, options_.margin_ratio * std::sqrt(box.Area()), &object.shifts});
   }
-  is_doubted_.resize(prior_.size());
-  for (size_t i = 0; i < prior_.size(); ++i) is_doubted_[i] = prior_[i] < 1 - options_.missed_object;
-  const std::span<const float> evidence = past_views_.Judge(*frame, is_doubted_, suspects_, nearest_depth);
+  const std::span<const float> evidence = past_views_.Judge(*frame, suspects_, nearest_depth);
   for (size_t i = 0; i < evidence.size(); ++i) {
     if (evidence[i] != 0) AddEvidence(evidence[i], i, frame);
   }

@@ -35,7 +35,7 @@ constexpr double kMinWitnessShare = 0.6;
 // 1.9 to 2.9, and 3.2 to 3.5. Less, as the views tell nearly the same.
 constexpr float kAtRest = 1, kWithObject = 2, kMostEvidence = 3;
 
-// Neighbours in the image mostly belong to the same surface.
+// Neighbours in the image mostly belong to the same surface, beside a box too: limbs reach out of it.
 constexpr float kNeighbourRadius_px = 12;
 
 constexpr size_t kMaxObjects = 64;  // bits of a word; what lies in others is not told apart
@@ -87,25 +87,42 @@ const PastViews::View* PastViews::FromBefore(const Frame& frame, double age_s) c
   return nearest;
 }
 
-std::span<const float> PastViews::Judge(const Frame& frame, std::span<const uint8_t> is_asked,
-                                        std::span<const Object> objects, double nearest_depth) {
+std::span<const float> PastViews::Judge(const Frame& frame, std::span<const Object> objects,
+                                        double nearest_depth) {
+  objects = objects.first(std::min(objects.size(), kMaxObjects));
   evidence_.assign(frame.features.size(), 0.0f);
   is_told_.assign(frame.features.size(), 0);
   ForgetUnlessNext(frame);
+  FindAsked(frame, objects);
   const View* before = nullptr;
   for (const double age_s : kAges_s) {
     const View* view = FromBefore(frame, age_s);
     if (view == nullptr || view == before) continue;  // images are rarer
-    Ask(*view, frame, is_asked, objects.first(std::min(objects.size(), kMaxObjects)), nearest_depth);
+    Ask(*view, frame, objects, nearest_depth);
     before = view;
   }
   for (float& evidence : evidence_) evidence = std::clamp(evidence, -kMostEvidence, kMostEvidence);
-  ShareWithNeighbours(frame, is_asked);
+  ShareWithNeighbours(frame);
   return evidence_;
 }
 
-void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_t> is_asked,
-                    std::span<const Object> objects, double nearest_depth) {
+void PastViews::FindAsked(const Frame& frame, std::span<const Object> objects) {
+  asked_.clear();
+  for (uint32_t i = 0; i < frame.features.size(); ++i) {
+    const Keypoint& keypoint = frame.features.keypoints[i];
+    const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
+    uint64_t boxes = 0;
+    for (size_t k = 0; k < objects.size(); ++k) {
+      const bool is_in =
+          objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y, objects[k].margin_px + outline_px);
+      boxes |= uint64_t{is_in} << k;
+    }
+    if (boxes != 0) asked_.push_back({i, boxes});
+  }
+}
+
+void PastViews::Ask(const View& view, const Frame& frame, std::span<const Object> objects,
+                    double nearest_depth) {
   const Rigid3 view_from_frame = view.cam_from_world * frame.cam_from_world.Inverse();
   const Eigen::Matrix3d rotation = view_from_frame.Matrix();
   const size_t steps = frame.id.value() - view.id.value();
@@ -115,13 +132,12 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
   std::array<int, kMaxObjects> at_rest{}, with_object{};
   std::array<std::optional<Eigen::Vector2d>, kMaxObjects> shifts_px;
   for (size_t k = 0; k < objects.size(); ++k) shifts_px[k] = objects[k].shifts->Sum(steps);
-  for (size_t i = 0; i < n; ++i) {
-    if (is_asked[i] == 0) continue;
+  for (const auto& [i, boxes] : asked_) {
     const Keypoint& keypoint = frame.features.keypoints[i];
     const Descriptor& descriptor = frame.features.descriptors[i];
     const Eigen::Vector2d px(keypoint.x, keypoint.y);
     const double scale = octave_scales_[static_cast<size_t>(keypoint.octave)];
-    const double radius_px = kGate * std::numbers::sqrt2 * scale, outline_px = kCornerRadius * scale;
+    const double radius_px = kGate * std::numbers::sqrt2 * scale;
     // At rest it was on the epipolar line between infinity and the nearest depth, or where its landmark is.
     const Eigen::Vector3d far = rotation * camera_.Unproject(px);
     const Eigen::Vector3d near = nearest_depth * far + view_from_frame.translation;
@@ -134,8 +150,7 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint8_
     int with_any = 257;
     bool is_clear = true;
     for (size_t k = 0; k < objects.size(); ++k) {
-      if (!objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y, objects[k].margin_px + outline_px))
-        continue;
+      if ((boxes >> k & 1) == 0) continue;
       const Eigen::Vector2d carried_px = px - shifts_px[k].value_or(Eigen::Vector2d::Zero());
       const double apart_px = shifts_px[k] ? DistanceToSegment(carried_px, far_px, near_px) : 0;
       // Nobody can tell who stands still, or is not known to move, from what is behind.
@@ -186,7 +201,7 @@ int PastViews::View::Nearest(const Descriptor& descriptor, int octave, const Eig
   return nearest;
 }
 
-void PastViews::ShareWithNeighbours(const Frame& frame, std::span<const uint8_t> is_asked) {
+void PastViews::ShareWithNeighbours(const Frame& frame) {
   const size_t n = evidence_.size();
   neighbours_sum_.assign(n, 0.0f);
   neighbours_.assign(n, 0);
@@ -202,7 +217,6 @@ void PastViews::ShareWithNeighbours(const Frame& frame, std::span<const uint8_t>
     });
   }
   for (size_t i = 0; i < n; ++i) {
-    if (is_asked[i] == 0) continue;
     // Their mean, the less the fewer they are.
     const float mean = neighbours_sum_[i] / static_cast<float>(neighbours_[i] + 1);
     evidence_[i] = std::clamp(evidence_[i] + mean, -kMostEvidence, kMostEvidence);

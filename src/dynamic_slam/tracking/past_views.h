@@ -54,10 +54,9 @@ class PastViews {
   void Clear() { count_ = 0; }
 
   // For each keypoint of the frame, which has a pose, the log-odds of being at rest that the views and its
-  // neighbours in the image give; 0 where nothing is known. is_asked: which keypoints. nearest_depth: nothing
-  // at rest is nearer. Valid until the next call.
-  std::span<const float> Judge(const Frame& frame, std::span<const uint8_t> is_asked,
-                               std::span<const Object> objects, double nearest_depth);
+  // neighbours in the image give; 0 where nothing is known. nearest_depth: nothing at rest is nearer. Valid
+  // until the next call.
+  std::span<const float> Judge(const Frame& frame, std::span<const Object> objects, double nearest_depth);
 
  private:
   struct View {
@@ -74,14 +73,21 @@ class PastViews {
 
   void ForgetUnlessNext(const Frame& frame);
   const View* FromBefore(const Frame& frame, double age_s) const;
-  void Ask(const View& view, const Frame& frame, std::span<const uint8_t> is_asked,
-           std::span<const Object> objects, double nearest_depth);
-  void ShareWithNeighbours(const Frame& frame, std::span<const uint8_t> is_asked);
+  void FindAsked(const Frame& frame, std::span<const Object> objects);
+  void Ask(const View& view, const Frame& frame, std::span<const Object> objects, double nearest_depth);
+  void ShareWithNeighbours(const Frame& frame);
 
   Camera camera_;
   std::vector<float> octave_scales_;
   std::vector<View> views_;  // the first count_, the oldest first; the others are kept for their memory
   size_t count_ = 0;
+
+  // The keypoints in boxes, and in which: bits.
+  struct Asked {
+    uint32_t keypoint;
+    uint64_t boxes;
+  };
+  std::vector<Asked> asked_;
 
   // Of each keypoint.
   std::vector<float> evidence_, neighbours_sum_;

@@ -63,8 +63,7 @@ class PastViewsTest : public ::testing::Test {
     shifts.Add({told_step_px, 0});
     last_ = MakeFrame(kFrames - 1, person_step_px);
     const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
-    const std::vector<uint8_t> all(last_.features.size(), 1);
-    return views_.Judge(last_, all, objects, 0.3 * kDepth);
+    return views_.Judge(last_, objects, 0.3 * kDepth);
   }
 
   Camera camera_ = TestCamera();
@@ -136,8 +135,7 @@ TEST_F(PastViewsTest, ACornerThatIsNewIsAsWhatIsAroundIt) {
   last_.grid.Build(last_.features, camera_.IdealBounds());
   last_.ClearLandmarks();
   const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
-  const std::vector<uint8_t> all(last_.features.size(), 1);
-  const std::span<const float> evidence = views_.Judge(last_, all, objects, 0.3 * kDepth);
+  const std::span<const float> evidence = views_.Judge(last_, objects, 0.3 * kDepth);
   for (size_t i = 0; i < n; ++i) {
     if (!InBox(places_[i], 20)) continue;
     if (on_person_[i]) {
