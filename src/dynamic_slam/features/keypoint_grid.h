@@ -41,7 +41,10 @@ class KeypointGrid {
           return (dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
                  (entry.octave <= max_octave);
         },
-        [&](int) __attribute__((always_inline)) { return Span{x - radius_px, x + radius_px}; }, fn);
+        [&](int) __attribute__((always_inline)) {
+          return Span{x - radius_px, x + radius_px};
+        },
+        fn);
   }
 
   // The same for those at a distance <= radius_px from the line between two ideal pixels.

@@ -113,7 +113,7 @@ class DynamicFilter {
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
-  std::vector<uint8_t> in_box_;      // of each keypoint
+  std::vector<uint8_t> in_box_;  // of each keypoint
   std::vector<PastViews::Object> suspects_;
   BoxMotionEstimator estimator_;
   std::vector<Box> boxes_before_;
