@@ -34,15 +34,13 @@ class KeypointGrid {
   __attribute__((always_inline)) void ForEachInWindow(float x, float y, float radius_px, int min_octave,
                                                       int max_octave, Fn&& fn) const {
     const float radius_squared = radius_px * radius_px;
-    ForEachInRectangle(
-        x - radius_px, y - radius_px, x + radius_px, y + radius_px,
+    const Columns columns{Column(x - radius_px), Column(x + radius_px)};
+    ForEachInRows(
+        y - radius_px, y + radius_px, [&](int) __attribute__((always_inline)) { return columns; },
         [&](const Entry& entry) __attribute__((always_inline)) {
           const float dx = entry.x - x, dy = entry.y - y;
           return (dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
                  (entry.octave <= max_octave);
-        },
-        [&](int) __attribute__((always_inline)) {
-          return Span{x - radius_px, x + radius_px};
         },
         fn);
   }
@@ -57,27 +55,24 @@ class KeypointGrid {
     const float length_squared = along.squaredNorm();
     const float over = length_squared > 0 ? 1 / length_squared : 0;
     const float reach_px = radius_px + 0.5f;  // more than the rounding of what follows
-    ForEachInRectangle(
-        std::min(a.x(), b.x()) - radius_px, std::min(a.y(), b.y()) - radius_px,
-        std::max(a.x(), b.x()) + radius_px, std::max(a.y(), b.y()) + radius_px,
+    ForEachInRows(
+        std::min(a.y(), b.y()) - radius_px, std::max(a.y(), b.y()) + radius_px,
+        // Of a line across rows and columns, a row of cells is near to a part only.
+        [&](int row) __attribute__((always_inline)) {
+          float enters = 0, leaves = 1;
+          if (std::abs(along.y()) > 1) {
+            enters = std::clamp((RowTop(row) - reach_px - a.y()) / along.y(), 0.0f, 1.0f);
+            leaves = std::clamp((RowTop(row + 1) + reach_px - a.y()) / along.y(), 0.0f, 1.0f);
+          }
+          const float from = a.x() + enters * along.x(), to = a.x() + leaves * along.x();
+          return Columns{Column(std::min(from, to) - reach_px), Column(std::max(from, to) + reach_px)};
+        },
         [&](const Entry& entry) __attribute__((always_inline)) {
           const float dx = entry.x - a.x(), dy = entry.y - a.y();
           const float t = std::min(std::max((dx * along.x() + dy * along.y()) * over, 0.0f), 1.0f);
           const float off_x = dx - t * along.x(), off_y = dy - t * along.y();
           return (off_x * off_x + off_y * off_y <= radius_squared) & (entry.octave >= min_octave) &
                  (entry.octave <= max_octave);
-        },
-        // Of a line across rows and columns, a row of cells is near to a part only.
-        [&](int row) __attribute__((always_inline)) {
-          Span t{0, 1};
-          if (std::abs(along.y()) > 1) {
-            const float enters = (RowTop(row) - reach_px - a.y()) / along.y();
-            const float leaves = (RowTop(row + 1) + reach_px - a.y()) / along.y();
-            t = {std::clamp(std::min(enters, leaves), 0.0f, 1.0f),
-                 std::clamp(std::max(enters, leaves), 0.0f, 1.0f)};
-          }
-          const float from = a.x() + t.min * along.x(), to = a.x() + t.max * along.x();
-          return Span{std::min(from, to) - reach_px, std::max(from, to) + reach_px};
         },
         fn);
   }
@@ -89,27 +84,26 @@ class KeypointGrid {
     int octave;
   };
 
-  struct Span {
-    float min, max;
+  struct Columns {
+    int first, last;
   };
 
-  // Of the keypoints in the cells that touch the rectangle, and in each row of cells touch x_of_row(row),
-  // those of which is_inside(entry) tells 1.
-  template <class IsInside, class XOfRow, class Fn>
-  __attribute__((always_inline)) void ForEachInRectangle(float min_x, float min_y, float max_x, float max_y,
-                                                         IsInside&& is_inside, XOfRow&& x_of_row,
-                                                         Fn&& fn) const {
-    if (entries_.empty() || !(min_x <= max_x) || !(min_y <= max_y)) return;
+  // Of the keypoints in the rows of cells that touch min_y to max_y, and there in columns_of_row(row), those
+  // of which is_inside(entry) tells 1.
+  template <class ColumnsOfRow, class IsInside, class Fn>
+  __attribute__((always_inline)) void ForEachInRows(float min_y, float max_y, ColumnsOfRow&& columns_of_row,
+                                                    IsInside&& is_inside, Fn&& fn) const {
+    if (entries_.empty() || !(min_y <= max_y)) return;
     const int first_row = Row(min_y), last_row = Row(max_y);
     // Where keypoints are is hard to predict, so they are first found without a branch, then visited.
     constexpr size_t kMost = 128;
     uint32_t found[kMost];
     size_t count = 0;
     for (int row = first_row; row <= last_row; ++row) {
-      const Span x = x_of_row(row);
+      const Columns columns = columns_of_row(row);
       // The cells of a row are neighbours in memory, so their keypoints are one range.
-      const uint32_t begin = cell_begin_[row * columns_ + Column(x.min)];
-      const uint32_t end = cell_begin_[row * columns_ + Column(x.max) + 1];
+      const uint32_t begin = cell_begin_[row * columns_ + columns.first];
+      const uint32_t end = cell_begin_[row * columns_ + columns.last + 1];
       for (uint32_t i = begin; i < end; ++i) {
         const Entry& entry = entries_[i];
         found[count] = entry.index;
@@ -130,11 +124,11 @@ class KeypointGrid {
     return min_y_ + kCellSizePx * static_cast<float>(row);
   }
 
-  // Clamped before the conversion: far outside, the float does not fit an int.
+  // Clamped before the conversion: far outside, the float does not fit an int. A NaN comes to cell 0.
   int Column(float x) const { return Cell((x - min_x_) * (1 / kCellSizePx), columns_); }
   int Row(float y) const { return Cell((y - min_y_) * (1 / kCellSizePx), rows_); }
   static int Cell(float cell, int cells) {
-    return static_cast<int>(std::clamp(cell, 0.0f, static_cast<float>(cells - 1)));
+    return static_cast<int>(std::min(std::max(0.0f, cell), static_cast<float>(cells - 1)));
   }
 
   float min_x_ = 0, min_y_ = 0;

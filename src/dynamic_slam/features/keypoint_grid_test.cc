@@ -134,6 +134,16 @@ TEST(KeypointGrid, OddQueriesFindNothing) {
   EXPECT_THAT(Query(grid, 0, 0, nan), testing::IsEmpty());
   EXPECT_THAT(Query(grid, 1e30f, -1e30f, 10), testing::IsEmpty());
   EXPECT_EQ(Query(grid, 0, 0, 1e9f).size(), 100u);
+  const auto count_along = [&grid](const Eigen::Vector2f& a, const Eigen::Vector2f& b, float radius_px) {
+    int count = 0;
+    grid.ForEachAlong(a, b, radius_px, 0, 7, [&](uint32_t) { ++count; });
+    return count;
+  };
+  EXPECT_EQ(count_along({0, 0}, {600, 400}, 1e9f), 100);
+  EXPECT_EQ(count_along({0, 0}, {600, 400}, -1), 0);
+  EXPECT_EQ(count_along({0, 0}, {600, 400}, nan), 0);
+  EXPECT_EQ(count_along({nan, 0}, {600, 400}, 50), 0);
+  EXPECT_EQ(count_along({0, 0}, {600, nan}, 50), 0);
   grid.Build(FeatureSet(), kBounds);
   EXPECT_THAT(Query(grid, 0, 0, 1e9f), testing::IsEmpty());
 }
