@@ -124,7 +124,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
       const auto before = std::find_if(last_objects_.begin(), last_objects_.end(), [&](const Object& object) {
         return object.box.track_id == box.track_id;
       });
-      Object object{.box = box};
+      Object object{.box = box, .margin_px = MarginOf(box.box)};
       if (before != last_objects_.end()) {
         object.motion_log_odds = before->motion_log_odds;
         object.shifts = before->shifts;
@@ -177,7 +177,9 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
   if (options_.method == "none") return;
   std::vector<Object> objects;
   for (const DynamicBox& box : boxes) {
-    if (box.is_dynamic) objects.push_back({.box = box, .moves = std::min(box.probability, kMostProbability)});
+    if (!box.is_dynamic) continue;
+    objects.push_back(
+        {.box = box, .margin_px = MarginOf(box.box), .moves = std::min(box.probability, kMostProbability)});
   }
   if (objects.empty()) return;
   static_probability->resize(features.size(), 1.0f);
@@ -190,19 +192,22 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
   }
 }
 
+double DynamicFilter::MarginOf(const Box& box) const {
+  return options_.method == "weights" ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
+}
+
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other.
 double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
                                     bool* in_box) const {
   const bool with_margin = options_.method == "weights";
-  const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
+  const double outline_px =
+      with_margin ? kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)] : 0;
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
   for (const Object& object : objects) {
     if (!object.IsMoving()) continue;
-    const Box& b = object.box.box;
-    const double margin_px = with_margin ? outline_px + options_.margin_ratio * std::sqrt(b.Area()) : 0;
-    if (!b.Contains(keypoint.raw_x, keypoint.raw_y, margin_px)) continue;
+    if (!object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px)) continue;
     belongs_to_none *= 1 - options_.object_share;
     sum_moves += object.moves;
     ++boxes;
@@ -239,7 +244,7 @@ void DynamicFilter::FindMovers(const KeypointFlow& flow) {
     for (const Object& before : last_objects_) {
       if (before.box.track_id != objects_[k].box.track_id) continue;
       const Box &a = before.box.box, &b = boxes_[k];
-      movers_.push_back({k, a, b, {}});
+      movers_.push_back({k, a, b, KeypointFlow::kReach * std::sqrt(b.Area()), {}});
       boxes_before_.push_back(a);
       expected_px_.emplace_back(b.CenterX() - a.CenterX(), b.CenterY() - a.CenterY());
     }
@@ -301,10 +306,8 @@ void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
     }
   }
   suspects_.clear();
-  for (const Object& object : objects_) {
-    const Box& box = object.box.box;
-    suspects_.push_back({box, options_.margin_ratio * std::sqrt(box.Area()), &object.shifts});
-  }
+  for (const Object& object : objects_)
+    suspects_.push_back({object.box.box, object.margin_px, &object.shifts});
   const std::span<const float> evidence = past_views_.Judge(*frame, suspects_, nearest_depth);
   for (size_t i = 0; i < evidence.size(); ++i) {
     if (evidence[i] != 0) AddEvidence(evidence[i], i, frame);
@@ -362,8 +365,7 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
     double sum_density = 0;
     int objects = 0;
     for (const Mover& mover : movers_) {
-      const double ring_px = KeypointFlow::kReach * std::sqrt(mover.to.Area());
-      if (!mover.to.Contains(now.raw_x, now.raw_y, ring_px)) continue;
+      if (!mover.to.Contains(now.raw_x, now.raw_y, mover.ring_px)) continue;
       ++objects;
       const Eigen::Vector2d center(mover.from.CenterX(), mover.from.CenterY());
       const Eigen::Vector2d raw_before(before.raw_x, before.raw_y);

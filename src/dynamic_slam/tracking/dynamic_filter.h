@@ -69,6 +69,7 @@ class DynamicFilter {
   // Something whose class is dynamic.
   struct Object {
     DynamicBox box;
+    double margin_px = 0;        // by which it may reach out of its box
     double moves = 1;            // P(moves) by its class and its motion so far
     double motion_log_odds = 0;  // of moving: what its motion tells beside the class
     ShiftHistory shifts = {};    // while the pose was known
@@ -80,6 +81,7 @@ class DynamicFilter {
   struct Mover {
     size_t object;  // in objects_
     Box from, to;
+    double ring_px;  // around `to`, where keypoints may be of it
     BoxMotion motion;
   };
 
@@ -93,6 +95,7 @@ class DynamicFilter {
   float Combine(float prior, float motion_log_odds) const;
   // How the keypoint moved tells so much more of whether it is at rest.
   void AddEvidence(float log_odds, size_t keypoint, Frame* frame) const;
+  double MarginOf(const Box& box) const;
   double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, bool* in_box) const;
   // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
   float Prior(double at_rest) const;

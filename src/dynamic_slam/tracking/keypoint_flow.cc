@@ -31,11 +31,14 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
   radius_px_ = camera_.fx * kMaxRate_rad_s * interval_s;
   const Eigen::Matrix3d rotation =
       frame_from_last.value_or(Eigen::Quaterniond::Identity()).toRotationMatrix();
+  reaches_px_.clear();
+  for (const Box& box : boxes) reaches_px_.push_back(kReach * std::sqrt(box.Area()));
   for (uint32_t i = 0; i < last.features.size(); ++i) {
     const Keypoint& from = last.features.keypoints[i];
-    const bool is_near = std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
-      return box.Contains(from.raw_x, from.raw_y, kReach * std::sqrt(box.Area()));
-    });
+    bool is_near = false;
+    for (size_t k = 0; k < boxes.size() && !is_near; ++k) {
+      is_near = boxes[k].Contains(from.raw_x, from.raw_y, reaches_px_[k]);
+    }
     if (!is_near) continue;
     const Eigen::Vector3d ray = rotation * camera_.Unproject({from.x, from.y});
     if (ray.z() <= 0) continue;

@@ -50,6 +50,7 @@ class KeypointFlow {
   Camera camera_;
   std::vector<float> octave_scales_;
   double radius_px_ = 1;
+  std::vector<double> reaches_px_;  // around each box
   std::vector<uint32_t> last_keypoints_;
   std::vector<int> distances_;
   std::vector<PointMotion> motions_;

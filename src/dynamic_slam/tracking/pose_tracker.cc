@@ -14,10 +14,6 @@ constexpr double kWindowRatio = 0.8;
 constexpr double kKeyframeRatio = 0.85;
 constexpr int kKeyframeDistance = (kStrictDistance + kLooseDistance) / 2;
 
-double TrustIn(const Frame& frame, size_t keypoint) {
-  return TrustInMatch(frame.StaticProbability(keypoint), frame.static_log_odds[keypoint]);
-}
-
 }  // namespace
 
 PoseTracker::PoseTracker(const Camera& camera, const TrackerOptions& options,
@@ -156,7 +152,8 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
     if (!frame->landmarks[i].IsValid()) continue;
     const Keypoint& keypoint = frame->features.keypoints[i];
     observations_.Add(frame->points[i], {keypoint.x, keypoint.y},
-                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)], TrustIn(*frame, i),
+                      1.0 / octave_scales_[static_cast<size_t>(keypoint.octave)],
+                      TrustInMatch(frame->StaticProbability(i), frame->static_log_odds[i]),
                       frame->spreads[i].cast<double>() / camera_.fx);
     observed_keypoints_.push_back(i);
   }
@@ -168,7 +165,7 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
   double trusted = 0;
   for (size_t i = 0; i < observed_keypoints_.size(); ++i) {
     if (estimate_.is_inlier[i] != 0) {
-      trusted += TrustIn(*frame, observed_keypoints_[i]);
+      trusted += observations_.weight[i];
       continue;
     }
     rejected_.push_back(frame->landmarks[observed_keypoints_[i]]);
