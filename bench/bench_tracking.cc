@@ -90,6 +90,7 @@ void RunBench(const BenchArguments& arguments) {
   cv::setNumThreads(1);
   SystemOptions options;
   options.orb.features = kOrbFeatures;
+  options.orb.threads = 1;
   ApplySet(&options, arguments.assignments);
   const std::unique_ptr<FrameSource> source = OpenFrameSource(arguments.source);
   const Camera camera = ChooseCamera(arguments, *source);

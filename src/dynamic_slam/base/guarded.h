@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <shared_mutex>
 #include <utility>
 
@@ -62,6 +63,9 @@ class Guarded {
     const T& operator*() const DS_NO_THREAD_SAFETY_ANALYSIS { return guarded_.value_; }
     const T* operator->() const { return &**this; }
 
+    // How often the value was open for writing: as long as that stays the same, so does the value.
+    uint64_t Writes() const DS_NO_THREAD_SAFETY_ANALYSIS { return guarded_.writes_; }
+
    private:
     friend class Guarded;
     explicit ReadHandle(const Guarded& guarded) DS_NO_THREAD_SAFETY_ANALYSIS : guarded_(guarded) {
@@ -88,6 +92,7 @@ class Guarded {
     explicit WriteHandle(Guarded& guarded) DS_NO_THREAD_SAFETY_ANALYSIS : guarded_(guarded) {
       internal::EnterGuarded();
       guarded_.mutex_.Lock();
+      ++guarded_.writes_;
     }
     Guarded& guarded_;
   };
@@ -102,6 +107,7 @@ class Guarded {
 
  private:
   mutable SharedMutex mutex_;
+  uint64_t writes_ DS_GUARDED_BY(mutex_) = 0;
   T value_ DS_GUARDED_BY(mutex_);
 };
 

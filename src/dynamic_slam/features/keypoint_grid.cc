@@ -25,10 +25,18 @@ void KeypointGrid::Build(const FeatureSet& features, const std::array<double, 4>
   }
   for (size_t cell = 1; cell < cell_begin_.size(); ++cell) cell_begin_[cell] += cell_begin_[cell - 1];
   next_ = cell_begin_;
-  entries_.resize(count);
+  const size_t padded = count + kLanes - 1;
+  x_.resize(padded);
+  y_.resize(padded);
+  octave_.resize(padded);
+  index_.resize(padded);
   for (size_t i = 0; i < count; ++i) {
     const Keypoint& keypoint = features.keypoints[i];
-    entries_[next_[cell_of_[i]]++] = {keypoint.x, keypoint.y, static_cast<uint32_t>(i), keypoint.octave};
+    const uint32_t place = next_[cell_of_[i]]++;
+    x_[place] = keypoint.x;
+    y_[place] = keypoint.y;
+    octave_[place] = keypoint.octave;
+    index_[place] = static_cast<uint32_t>(i);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -24,7 +25,7 @@ class KeypointGrid {
   // Keypoints outside go to the nearest border cell and are found all the same.
   void Build(const FeatureSet& features, const std::array<double, 4>& bounds);
 
-  size_t size() const { return entries_.size(); }
+  size_t size() const { return cell_of_.size(); }
 
   // Calls fn(uint32_t index) for each keypoint at a distance <= radius_px from the ideal pixel (x, y) and of
   // an octave from min_octave to max_octave, and for no other, cell by cell (row-major), in a cell by index.
@@ -37,10 +38,9 @@ class KeypointGrid {
     const Columns columns{Column(x - radius_px), Column(x + radius_px)};
     ForEachInRows(
         y - radius_px, y + radius_px, [&](int) __attribute__((always_inline)) { return columns; },
-        [&](const Entry& entry) __attribute__((always_inline)) {
-          const float dx = entry.x - x, dy = entry.y - y;
-          return (dx * dx + dy * dy <= radius_squared) & (entry.octave >= min_octave) &
-                 (entry.octave <= max_octave);
+        [&](const Lanes& at_x, const Lanes& at_y, const Flags& octave) __attribute__((always_inline)) {
+          const Lanes dx = at_x - x, dy = at_y - y;
+          return (dx * dx + dy * dy <= radius_squared) & (octave >= min_octave) & (octave <= max_octave);
         },
         fn);
   }
@@ -67,33 +67,43 @@ class KeypointGrid {
           const float from = a.x() + enters * along.x(), to = a.x() + leaves * along.x();
           return Columns{Column(std::min(from, to) - reach_px), Column(std::max(from, to) + reach_px)};
         },
-        [&](const Entry& entry) __attribute__((always_inline)) {
-          const float dx = entry.x - a.x(), dy = entry.y - a.y();
-          const float t = std::min(std::max((dx * along.x() + dy * along.y()) * over, 0.0f), 1.0f);
-          const float off_x = dx - t * along.x(), off_y = dy - t * along.y();
-          return (off_x * off_x + off_y * off_y <= radius_squared) & (entry.octave >= min_octave) &
-                 (entry.octave <= max_octave);
+        [&](const Lanes& at_x, const Lanes& at_y, const Flags& octave) __attribute__((always_inline)) {
+          constexpr Lanes kZero = {}, kOne = {1, 1, 1, 1};
+          const Lanes dx = at_x - a.x(), dy = at_y - a.y();
+          Lanes t = (dx * along.x() + dy * along.y()) * over;
+          t = t < kZero ? kZero : t;
+          t = t > kOne ? kOne : t;
+          const Lanes off_x = dx - t * along.x(), off_y = dy - t * along.y();
+          return (off_x * off_x + off_y * off_y <= radius_squared) & (octave >= min_octave) &
+                 (octave <= max_octave);
         },
         fn);
   }
 
  private:
-  struct Entry {
-    float x, y;  // ideal px; copied here so that a query reads one array only
-    uint32_t index;
-    int octave;
-  };
+  // Numbers of some keypoints side by side; a comparison gives -1 where it is true, else 0. The compiler makes
+  // of it what the processor has.
+  static constexpr uint32_t kLanes = 4;
+  using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+  using Flags = int32_t __attribute__((vector_size(kLanes * sizeof(int32_t))));
+
+  template <class To, class From>
+  __attribute__((always_inline)) static To Load(const std::vector<From>& from, uint32_t begin) {
+    To to;
+    std::memcpy(&to, from.data() + begin, sizeof(to));
+    return to;
+  }
 
   struct Columns {
     int first, last;
   };
 
   // Of the keypoints in the rows of cells that touch min_y to max_y, and there in columns_of_row(row), those
-  // of which is_inside(entry) tells 1.
+  // of which is_inside(x, y, octave) tells -1; it is asked about kLanes of them at a time.
   template <class ColumnsOfRow, class IsInside, class Fn>
   __attribute__((always_inline)) void ForEachInRows(float min_y, float max_y, ColumnsOfRow&& columns_of_row,
                                                     IsInside&& is_inside, Fn&& fn) const {
-    if (entries_.empty() || !(min_y <= max_y)) return;
+    if (size() == 0 || !(min_y <= max_y)) return;
     const int first_row = Row(min_y), last_row = Row(max_y);
     // Where keypoints are is hard to predict, so they are first found without a branch, then visited.
     constexpr size_t kMost = 128;
@@ -104,13 +114,20 @@ class KeypointGrid {
       // The cells of a row are neighbours in memory, so their keypoints are one range.
       const uint32_t begin = cell_begin_[row * columns_ + columns.first];
       const uint32_t end = cell_begin_[row * columns_ + columns.last + 1];
-      for (uint32_t i = begin; i < end; ++i) {
-        const Entry& entry = entries_[i];
-        found[count] = entry.index;
-        count += static_cast<size_t>(is_inside(entry));
-        if (count == kMost) {
-          for (const uint32_t index : found) fn(index);
+      for (uint32_t i = begin; i < end; i += kLanes) {
+        if (count > kMost - kLanes) {
+          for (size_t k = 0; k < count; ++k) fn(found[k]);
           count = 0;
+        }
+        // Keypoints of other cells may follow the last one.
+        constexpr Flags kSteps = {0, 1, 2, 3};
+        const Flags inside = is_inside(Load<Lanes>(x_, i), Load<Lanes>(y_, i), Load<Flags>(octave_, i)) &
+                             (kSteps < static_cast<int32_t>(end - i));
+        int32_t is_found[kLanes];
+        std::memcpy(is_found, &inside, sizeof(is_found));
+        for (uint32_t k = 0; k < kLanes; ++k) {
+          found[count] = index_[i + k];
+          count -= static_cast<size_t>(is_found[k]);
         }
       }
     }
@@ -134,7 +151,10 @@ class KeypointGrid {
   float min_x_ = 0, min_y_ = 0;
   int columns_ = 0, rows_ = 0;
   std::vector<uint32_t> cell_begin_;  // columns * rows + 1
-  std::vector<Entry> entries_;
+  // Of the keypoints, cell by cell, and kLanes - 1 more that are nobody's.
+  std::vector<float> x_, y_;  // ideal px
+  std::vector<int32_t> octave_;
+  std::vector<uint32_t> index_;
   std::vector<uint32_t> cell_of_, next_;
 };
 

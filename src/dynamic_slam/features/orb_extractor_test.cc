@@ -238,6 +238,27 @@ TEST(OrbExtractor, TheSameImageGivesTheSameBytes) {
   EXPECT_TRUE(SameBytes(first, Extract(image, DistortedCamera())));
 }
 
+TEST(OrbExtractor, AnyNumberOfThreadsGivesTheSameBytes) {
+  const cv::Mat image = Texture(640, 480, 8);
+  cv::Mat mask = cv::Mat::zeros(480, 640, CV_8UC1);
+  mask(cv::Rect(300, 100, 150, 300)) = 1;
+  const std::vector<cv::Rect> deferred{{0, 0, 200, 480}};
+  const auto extract = [&](int threads) {
+    OrbOptions options;
+    options.threads = threads;
+    OrbExtractor extractor(options, DistortedCamera());
+    extractor.Defer(deferred);
+    std::vector<FeatureSet> sets(3);
+    for (FeatureSet& features : sets) extractor.Extract(image, mask, &features);
+    return sets;
+  };
+  const FeatureSet alone = extract(1)[0];
+  EXPECT_EQ(alone.size(), 1000u);
+  for (const int threads : {0, 2, 3, 16}) {
+    for (const FeatureSet& features : extract(threads)) EXPECT_TRUE(SameBytes(features, alone)) << threads;
+  }
+}
+
 TEST(OrbExtractor, NothingOfTheImageIsKeptOrChanged) {
   cv::Mat image = Texture(640, 480, 7);
   const cv::Mat copy = image.clone();

@@ -11,6 +11,7 @@ struct OrbOptions {
   int fast_threshold = 16;
   int fast_threshold_min = 7;
   int fast_threshold_starved = 4;
+  int threads = 0;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
@@ -25,6 +26,10 @@ struct OrbOptions {
           OptionField{
               "grey levels", 1, 255,
               "The same while no pose is known and dynamic objects leave fewer keypoints than wanted."});
+    visit("threads", self.threads,
+          OptionField{"", 0, 16,
+                      "Threads that share the pyramid's levels; the same keypoints with any. 0: offline as many "
+                      "as there are processors, in realtime two fewer, 4 at most."});
   }
 };
 

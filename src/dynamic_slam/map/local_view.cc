@@ -12,6 +12,8 @@ constexpr size_t kNeighbours = 10;
 // Landmarks lie anywhere in memory, so each is asked for some steps before it is read.
 constexpr size_t kAhead = 12;
 
+constexpr uint32_t kNotCopied = 0xffffffffu;
+
 void FetchAhead(const Landmark* landmark) {
 #ifdef __GNUC__
   constexpr size_t kCacheLine = 64;
@@ -23,19 +25,18 @@ void FetchAhead(const Landmark* landmark) {
 
 }  // namespace
 
-void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes,
-                             LocalView* view) {
-  view->ids.clear();
-  view->positions.clear();
-  view->normals.clear();
-  view->spreads.clear();
-  view->min_distances.clear();
-  view->max_distances.clear();
-  view->descriptors.clear();
-  view->static_log_odds.clear();
-  view->reference = KeyframeId();
+void LocalViewBuilder::Build(const Map& map, uint64_t writes, const std::vector<LandmarkId>& seen,
+                             int max_keyframes, LocalView* view) {
+  if (writes_ != writes) ForgetCopies(view);
+  writes_ = writes;
   view->revision = map.revision();
+  CountVotes(map, seen);
+  ChooseKeyframes(map, static_cast<size_t>(max_keyframes), view);
+  CollectLandmarks(map);
+  CopyLandmarks(map, view);
+}
 
+void LocalViewBuilder::CountVotes(const Map& map, const std::vector<LandmarkId>& seen) {
   votes_.resize(map.keyframes().CreatedCount());
   std::fill(votes_.begin(), votes_.end(), 0);
   for (const LandmarkId id : seen) {
@@ -43,7 +44,11 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     if (landmark == nullptr) continue;
     for (const Observation& observation : landmark->observations()) ++votes_[observation.keyframe.value()];
   }
+}
+
+void LocalViewBuilder::ChooseKeyframes(const Map& map, size_t limit, LocalView* view) {
   keyframes_.clear();
+  view->reference = KeyframeId();
   int most_votes = 0;
   for (uint32_t i = 0; i < votes_.size(); ++i) {
     if (votes_[i] == 0) continue;
@@ -57,7 +62,6 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     view->reference_from_world = map.keyframes().At(view->reference).cam_from_world();
     view->reference_unit = map.keyframes().At(view->reference).unit();
   }
-  const size_t limit = static_cast<size_t>(max_keyframes);
   std::sort(keyframes_.begin(), keyframes_.end(), [this](KeyframeId a, KeyframeId b) {
     const int votes_a = votes_[a.value()], votes_b = votes_[b.value()];
     return votes_a != votes_b ? votes_a > votes_b : a < b;
@@ -72,7 +76,10 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
       keyframes_.push_back(other.id);
     }
   }
+}
 
+void LocalViewBuilder::CollectLandmarks(const Map& map) {
+  landmarks_.clear();
   is_taken_.resize((map.landmarks().CreatedCount() + 63) / 64 + 1);
   for (const KeyframeId keyframe : keyframes_) {
     const Keyframe& seen_from = map.keyframes().At(keyframe);
@@ -85,16 +92,27 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
       count += 1 & ~(bits >> (id.value() % 64));
       bits |= uint64_t{1} << (id.value() % 64);
     });
-    view->ids.insert(view->ids.end(), fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(count));
+    landmarks_.insert(landmarks_.end(), fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(count));
   }
-  landmarks_.clear();
-  for (const LandmarkId id : view->ids) {
-    is_taken_[id.value() / 64] = 0;
-    landmarks_.push_back(&map.landmarks().At(id));
+  for (const LandmarkId id : landmarks_) is_taken_[id.value() / 64] = 0;
+}
+
+void LocalViewBuilder::CopyLandmarks(const Map& map, LocalView* view) {
+  entry_of_.resize(map.landmarks().CreatedCount(), kNotCopied);
+  view->near.clear();
+  copied_.clear();
+  for (const LandmarkId id : landmarks_) {
+    uint32_t& entry = entry_of_[id.value()];
+    if (entry == kNotCopied) {
+      entry = static_cast<uint32_t>(view->ids.size());
+      view->ids.push_back(id);
+      copied_.push_back(&map.landmarks().At(id));
+    }
+    view->near.push_back(entry);
   }
-  for (size_t i = 0; i < landmarks_.size(); ++i) {
-    if (i + kAhead < landmarks_.size()) FetchAhead(landmarks_[i + kAhead]);
-    const Landmark& landmark = *landmarks_[i];
+  for (size_t i = 0; i < copied_.size(); ++i) {
+    if (i + kAhead < copied_.size()) FetchAhead(copied_[i + kAhead]);
+    const Landmark& landmark = *copied_[i];
     view->positions.push_back(landmark.position());
     view->normals.push_back(landmark.normal());
     view->spreads.push_back(landmark.spread());
@@ -103,6 +121,18 @@ void LocalViewBuilder::Build(const Map& map, const std::vector<LandmarkId>& seen
     view->descriptors.push_back(landmark.descriptor());
     view->static_log_odds.push_back(landmark.static_log_odds);
   }
+}
+
+void LocalViewBuilder::ForgetCopies(LocalView* view) {
+  for (const LandmarkId id : view->ids) entry_of_[id.value()] = kNotCopied;
+  view->ids.clear();
+  view->positions.clear();
+  view->normals.clear();
+  view->spreads.clear();
+  view->min_distances.clear();
+  view->max_distances.clear();
+  view->descriptors.clear();
+  view->static_log_odds.clear();
 }
 
 }  // namespace dynamic_slam

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,6 +16,9 @@ namespace dynamic_slam {
 // The landmarks that tracking may see next, copied out of the map so that it can work without looking at the
 // map: a structure of arrays, entry i of each belongs to one landmark.
 struct LocalView {
+  // Entries of the landmarks in view, in the order in which they are looked for; of others there are entries
+  // too.
+  std::vector<uint32_t> near;
   std::vector<LandmarkId> ids;
   std::vector<Eigen::Vector3d> positions;  // in world
   std::vector<Eigen::Vector3f> normals, spreads;
@@ -26,22 +30,34 @@ struct LocalView {
   double reference_unit = 1;    // Keyframe::unit
   uint32_t revision = 0;        // of the map
 
-  size_t size() const { return ids.size(); }
+  size_t size() const { return near.size(); }
 };
 
 // Finds the keyframes that see the given landmarks, adds their best neighbours up to max_keyframes, and
-// copies what they all see. Entries that are not valid or gone are passed over. Keeps the buffers of *view.
+// copies what they all see. Entries that are not valid or gone are passed over. Keeps the buffers of *view,
+// which is the same in each call; what was copied of a map that has not changed since is not copied again.
 class LocalViewBuilder {
  public:
-  void Build(const Map& map, const std::vector<LandmarkId>& seen, int max_keyframes, LocalView* view);
+  // writes: Guarded::ReadHandle::Writes of the map.
+  void Build(const Map& map, uint64_t writes, const std::vector<LandmarkId>& seen, int max_keyframes,
+             LocalView* view);
 
  private:
+  void CountVotes(const Map& map, const std::vector<LandmarkId>& seen);
+  void ChooseKeyframes(const Map& map, size_t limit, LocalView* view);
+  void CollectLandmarks(const Map& map);
+  void CopyLandmarks(const Map& map, LocalView* view);
+  void ForgetCopies(LocalView* view);
+
+  std::optional<uint64_t> writes_;  // to the map, when the copies were made
+  std::vector<uint32_t> entry_of_;  // in the view, by landmark id
   // The landmarks that the view holds already: a bit for each that ever was, all 0 between builds.
   std::vector<uint64_t> is_taken_;
-  std::vector<LandmarkId> fresh_;  // of one keyframe
-  std::vector<int> votes_;         // by keyframe id
+  std::vector<LandmarkId> fresh_;      // of one keyframe
+  std::vector<LandmarkId> landmarks_;  // of all
+  std::vector<const Landmark*> copied_;  // in this build
+  std::vector<int> votes_;  // by keyframe id
   std::vector<KeyframeId> keyframes_;
-  std::vector<const Landmark*> landmarks_;  // during Build
   std::vector<CovisibleKeyframe> neighbours_;
 };
 

@@ -228,6 +228,12 @@ TEST(MapTest, TheSpreadIsHowFarItCanBeOffUnseen) {
   EXPECT_NEAR(landmark.spread().normalized().dot(landmark.normal()), 1, 1e-6);
 }
 
+std::vector<LandmarkId> Near(const LocalView& view) {
+  std::vector<LandmarkId> ids;
+  for (const uint32_t entry : view.near) ids.push_back(view.ids[entry]);
+  return ids;
+}
+
 TEST(LocalViewTest, HoldsWhatTheNeighboursSeeOnce) {
   Map map = MakeMap();
   const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10);
@@ -236,12 +242,34 @@ TEST(LocalViewTest, HoldsWhatTheNeighboursSeeOnce) {
   const LandmarkId beyond = AddLandmark(&map, {{b, 2}, {c, 2}});
   LocalView view;
   LocalViewBuilder builder;
-  builder.Build(map, {LandmarkId(), seen, LandmarkId(77)}, 2, &view);
-  EXPECT_THAT(view.ids, testing::UnorderedElementsAre(seen, near, beyond));
+  builder.Build(map, 1, {LandmarkId(), seen, LandmarkId(77)}, 2, &view);
+  EXPECT_THAT(Near(view), testing::UnorderedElementsAre(seen, near, beyond));
   EXPECT_EQ(view.reference, b) << "the younger of two with equal votes";
-  builder.Build(map, {}, 2, &view);
+  builder.Build(map, 1, {}, 2, &view);
   EXPECT_EQ(view.size(), 0u);
   EXPECT_FALSE(view.reference.IsValid());
+}
+
+TEST(LocalViewTest, CopiesAgainOnlyWhatMayHaveChanged) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10);
+  const LandmarkId of_a = AddLandmark(&map, {{a, 0}}), of_b = AddLandmark(&map, {{b, 0}});
+  LocalView view;
+  LocalViewBuilder builder;
+  const auto position = [&](size_t k) { return view.positions[view.near[k]]; };
+  builder.Build(map, 1, {of_a}, 1, &view);
+  EXPECT_THAT(Near(view), testing::ElementsAre(of_a));
+  const Eigen::Vector3d before = position(0), after(1, 2, 3);
+  ASSERT_NE(before, after);
+  map.landmarks().At(of_a).set_position(after);
+  builder.Build(map, 1, {of_b}, 1, &view);
+  EXPECT_THAT(Near(view), testing::ElementsAre(of_b));
+  builder.Build(map, 1, {of_a, of_b}, 2, &view);
+  EXPECT_THAT(Near(view), testing::UnorderedElementsAre(of_a, of_b));
+  EXPECT_EQ(position(0), before) << "it was told that the map is the same";
+  builder.Build(map, 2, {of_a}, 1, &view);
+  EXPECT_THAT(Near(view), testing::ElementsAre(of_a));
+  EXPECT_EQ(position(0), after);
 }
 
 TEST(FrameTest, AMergedLandmarkIsLinkedOnce) {

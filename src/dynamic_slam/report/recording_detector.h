@@ -16,6 +16,7 @@ class RecordingDetector : public Detector {
       : Detector(detector->name(), detector->class_names()), detector_(std::move(detector)) {}
 
   void SetPreparation(const BoxMapping& mapping) override { detector_->SetPreparation(mapping); }
+  bool ReadsPixels() const override { return detector_->ReadsPixels(); }
 
   // In the order of the images, as far as it came; it may still be at work when the run has ended.
   std::vector<BoxRecord> records() const { return *records_.Read(); }

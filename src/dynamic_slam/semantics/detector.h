@@ -25,6 +25,10 @@ class Detector {
   // before the first image.
   virtual void SetPreparation(const BoxMapping&) {}
 
+  // Whether its answers depend on the pixels. Else any image of the right size will do, and its pixels may
+  // change meanwhile.
+  virtual bool ReadsPixels() const { return true; }
+
   // As it was asked for: "hog", the name of a detector file, "boxes".
   const std::string& name() const { return name_; }
 

@@ -30,6 +30,7 @@ class ReplayDetector : public Detector {
   }
 
   void SetPreparation(const BoxMapping& mapping) override { mapping_ = mapping; }
+  bool ReadsPixels() const override { return false; }
 
  private:
   std::vector<Detection> Find(const cv::Mat&, FrameId, double timestamp_s) override {

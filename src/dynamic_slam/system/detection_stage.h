@@ -42,7 +42,8 @@ class DetectionStage {
   // about this frame.
   bool Begin(FrameId frame, double timestamp_s);
 
-  // Asks about the image (as Detector takes it), which must not change until Begin() is true again.
+  // Asks about the image (as Detector takes it), which must not change until Begin() is true again if the
+  // detector reads its pixels.
   void Submit(FrameId frame, double timestamp_s, const cv::Mat& image);
 
   // The boxes of the frame, whether it was asked about or not. cam_from_last, motions: as far as known

@@ -37,6 +37,15 @@ void StartImageThreads() {
   cv::parallel_for_(cv::Range(0, 4 * std::max(1, cv::getNumThreads())), [](const cv::Range&) {});
 }
 
+// In realtime mapping and the detector have a processor each.
+OrbOptions WithThreads(OrbOptions orb, RunMode mode) {
+  if (orb.threads > 0) return orb;
+  constexpr int kMostThreads = 4;  // the finest level is a third of the work
+  const int processors = cv::getNumberOfCPUs();
+  orb.threads = std::clamp(mode == RunMode::kOffline ? processors : processors - 2, 1, kMostThreads);
+  return orb;
+}
+
 const SystemOptions& Checked(const SystemOptions& options) {
   CheckOptions(options);
   return options;
@@ -56,7 +65,7 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       preparer_(raw_camera, options.image),
       mode_(mode),
       map_(OctaveScales(options.orb)),
-      tracker_(camera(), options.orb, options.tracker, options.dynamic, options.seed, &map_),
+      tracker_(camera(), WithThreads(options.orb, mode), options.tracker, options.dynamic, options.seed, &map_),
       mapper_(camera(), options.mapper, &map_),
       loop_closer_(camera(), options.loop, options.seed, &map_),
       executor_(std::move(executor)) {
@@ -91,9 +100,10 @@ FrameResult SlamSystem::ProcessPrepared(double timestamp_s, const cv::Mat& image
   result.id = FrameId(frame_count_++);
   double asking_ms = 0;  // inline, the detector itself
   if (detection_.has_value() && detection_->Begin(result.id, timestamp_s)) {
-    preparer_.PrepareColour(image, &colour_);
+    const bool reads_pixels = detection_->detector().ReadsPixels();
+    if (reads_pixels) preparer_.PrepareColour(image, &colour_);
     const auto asked = std::chrono::steady_clock::now();
-    detection_->Submit(result.id, timestamp_s, colour_);
+    detection_->Submit(result.id, timestamp_s, reads_pixels ? colour_ : grey_);
     asking_ms = MillisecondsSince(asked);
   }
   tracker_.Extract(result.id, timestamp_s, grey_, mask);

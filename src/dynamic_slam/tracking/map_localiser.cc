@@ -19,7 +19,8 @@ MapLocaliser::MapLocaliser(const Camera& camera, const TrackerOptions& options,
 
 void MapLocaliser::LookAround(const Frame& frame) {
   DS_TRACE("tracking/view");
-  view_builder_.Build(*map_->Read(), frame.landmarks, options_.local_keyframes, &view_);
+  const auto map = map_->Read();
+  view_builder_.Build(*map, map.Writes(), frame.landmarks, options_.local_keyframes, &view_);
 }
 
 int MapLocaliser::MatchView(double radius_px, Frame* frame) {
@@ -37,7 +38,8 @@ int MapLocaliser::TrackNear(KeyframeId keyframe, const Rigid3& cam_from_world, d
   frame->cam_from_world = cam_from_world;
   {
     const auto map = map_->Read();
-    view_builder_.Build(*map, map->keyframes().At(keyframe).landmarks(), options_.local_keyframes, &view_);
+    view_builder_.Build(*map, map.Writes(), map->keyframes().At(keyframe).landmarks(),
+                        options_.local_keyframes, &view_);
   }
   return MatchViewTwice(radius_px, frame);
 }

@@ -107,7 +107,7 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
   std::fill(in_view->begin(), in_view->end(), uint8_t{0});
   TakeUnusable(*frame);
   uint32_t max_id = 0;
-  for (const LandmarkId id : view.ids) max_id = std::max(max_id, id.value());
+  for (const uint32_t i : view.near) max_id = std::max(max_id, view.ids[i].value());
   for (const LandmarkId id : frame->landmarks) {
     if (id.IsValid()) max_id = std::max(max_id, id.value());
   }
@@ -120,13 +120,14 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
   }
 
   projector_.SetPose(frame->cam_from_world);
-  for (size_t i = 0; i < view.size(); ++i) {
+  for (size_t k = 0; k < view.size(); ++k) {
+    const uint32_t i = view.near[k];
     LandmarkProjection projection;
     if (!projector_.Project(view.positions[i], view.normals[i], view.min_distances[i], view.max_distances[i],
                             &projection)) {
       continue;
     }
-    (*in_view)[i] = 1;
+    (*in_view)[k] = 1;
     if (landmark_known_[view.ids[i].value()] != 0) continue;
     const float scale = octave_scales_[static_cast<size_t>(projection.octave)];
     const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),

@@ -87,7 +87,7 @@ TEST_F(PoseTrackerTest, TheLocalMapAddsWhatTheFrameDoesNotHave) {
   const int few = tracker_.TrackFromFrame(last, SidewaysPose(0.3), 15, &frame_.frame);
   ASSERT_GT(few, 20);
   LocalView view;
-  LocalViewBuilder().Build(scene_.map, frame_.frame.landmarks, 10, &view);
+  LocalViewBuilder().Build(scene_.map, 0, frame_.frame.landmarks, 10, &view);
   std::vector<uint8_t> in_view;
   const int many = tracker_.TrackLocalMap(view, 4, &frame_.frame, &in_view);
   EXPECT_GT(many, 2 * few);

@@ -404,8 +404,9 @@ double Tracker::MedianDepthOfFrame() {
 void Tracker::CountVisibility() {
   const bool shield = filter_.options().shield_hidden && filter_.HasBoxes();
   const LocalView& view = localiser_.view();
-  for (size_t i = 0; i < view.size(); ++i) {
-    if (localiser_.in_view()[i] == 0) continue;
+  for (size_t k = 0; k < view.size(); ++k) {
+    if (localiser_.in_view()[k] == 0) continue;
+    const uint32_t i = view.near[k];
     // Nobody sees what is behind a person; where it is found after all, that counts as seen too.
     if (shield && filter_.IsHidden(camera_.Project(frame_.cam_from_world * view.positions[i]))) {
       continue;
