@@ -55,7 +55,9 @@ TEST_P(CrewTest, AnExceptionEndsTheLoopAndNotTheCrew) {
   };
   EXPECT_THROW(loop(), std::runtime_error);
   EXPECT_GE(passes, 3) << "they began before the one that failed";
-  if (GetParam() == 1) EXPECT_EQ(passes, 3);
+  if (GetParam() == 1) {
+    EXPECT_EQ(passes, 3);
+  }
   passes = 0;
   crew_.ForEach(50, [&](size_t, size_t) { ++passes; });
   EXPECT_EQ(passes, 50);

@@ -98,6 +98,17 @@ class KeypointGrid {
     int first, last;
   };
 
+  // Bit k is that of lane k.
+  __attribute__((always_inline)) static unsigned Bits(const Flags& flags) {
+#ifdef __SSE2__
+    return static_cast<unsigned>(__builtin_ia32_movmskps(reinterpret_cast<const Lanes&>(flags)));
+#else
+    unsigned bits = 0;
+    for (uint32_t k = 0; k < kLanes; ++k) bits |= (flags[k] & 1u) << k;
+    return bits;
+#endif
+  }
+
   // Of the keypoints in the rows of cells that touch min_y to max_y, and there in columns_of_row(row), those
   // of which is_inside(x, y, octave) tells -1; it is asked about kLanes of them at a time.
   template <class ColumnsOfRow, class IsInside, class Fn>
@@ -123,11 +134,10 @@ class KeypointGrid {
         constexpr Flags kSteps = {0, 1, 2, 3};
         const Flags inside = is_inside(Load<Lanes>(x_, i), Load<Lanes>(y_, i), Load<Flags>(octave_, i)) &
                              (kSteps < static_cast<int32_t>(end - i));
-        int32_t is_found[kLanes];
-        std::memcpy(is_found, &inside, sizeof(is_found));
+        const unsigned bits = Bits(inside);
         for (uint32_t k = 0; k < kLanes; ++k) {
           found[count] = index_[i + k];
-          count -= static_cast<size_t>(is_found[k]);
+          count += bits >> k & 1;
         }
       }
     }

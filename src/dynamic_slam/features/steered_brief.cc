@@ -83,15 +83,19 @@ float SteeredBrief::Angle(const cv::Mat& image, int x, int y) {
 Descriptor SteeredBrief::Describe(const uint8_t* centre, float angle_rad) const {
   const int turns = static_cast<int>(std::lround(angle_rad * (kAngles / (2 * std::numbers::pi_v<float>))));
   const Offsets& offsets = offsets_[static_cast<unsigned>(turns) % kAngles];
-  Descriptor descriptor;
-  for (int word = 0; word < 4; ++word) {
-    const int32_t* first = offsets.first.data() + 64 * word;
-    const int32_t* second = offsets.second.data() + 64 * word;
-    uint64_t bits = 0;
-    for (int i = 0; i < 64; ++i) bits |= static_cast<uint64_t>(centre[first[i]] < centre[second[i]]) << i;
-    descriptor[word] = bits;
+  const auto is_darker = [&](int test) -> uint64_t {
+    return centre[offsets.first[test]] < centre[offsets.second[test]];
+  };
+  // The processor adds a comparison to twice a word in one step; four words at a time, as each waits for its
+  // last step.
+  uint64_t a = 0, b = 0, c = 0, d = 0;
+  for (int i = 63; i >= 0; --i) {
+    a = 2 * a + is_darker(i);
+    b = 2 * b + is_darker(64 + i);
+    c = 2 * c + is_darker(128 + i);
+    d = 2 * d + is_darker(192 + i);
   }
-  return descriptor;
+  return {a, b, c, d};
 }
 
 }  // namespace dynamic_slam

@@ -71,7 +71,7 @@ void PastViews::Add(const Frame& frame) {
   View& view = views_[count_++];
   view.id = frame.id;
   view.timestamp_s = frame.timestamp_s;
-  view.features = frame.features;
+  view.descriptors = frame.features.descriptors;
   view.grid = frame.grid;
   view.cam_from_world = frame.cam_from_world;
 }
@@ -196,7 +196,7 @@ int PastViews::View::Nearest(const Descriptor& descriptor, int octave, const Eig
   grid.ForEachAlong(
       a.cast<float>(), b.cast<float>(), static_cast<float>(radius_px), octave - 1,
       octave + 1, [&](uint32_t j) __attribute__((always_inline)) {
-        nearest = std::min(nearest, HammingDistance(descriptor, features.descriptors[j]));
+        nearest = std::min(nearest, HammingDistance(descriptor, descriptors[j]));
       });
   return nearest;
 }

@@ -62,7 +62,7 @@ class PastViews {
   struct View {
     FrameId id;
     double timestamp_s = 0;
-    FeatureSet features;
+    std::vector<Descriptor> descriptors;
     KeypointGrid grid;
     Rigid3 cam_from_world;
 
