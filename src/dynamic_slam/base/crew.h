@@ -32,9 +32,12 @@ class Crew {
       for (size_t pass = 0; pass < count; ++pass) fn(pass, size_t{0});
       return;
     }
-    Share(count, [](void* context, size_t pass, size_t member) {
-      (*static_cast<std::remove_reference_t<Fn>*>(context))(pass, member);
-    }, &fn);
+    Share(
+        count,
+        [](void* context, size_t pass, size_t member) {
+          (*static_cast<std::remove_reference_t<Fn>*>(context))(pass, member);
+        },
+        &fn);
   }
 
  private:

@@ -81,8 +81,8 @@ class KeypointGrid {
   }
 
  private:
-  // Numbers of some keypoints side by side; a comparison gives -1 where it is true, else 0. The compiler makes
-  // of it what the processor has.
+  // Numbers of some keypoints side by side; a comparison gives -1 where it is true, else 0. The compiler
+  // makes of it what the processor has.
   static constexpr uint32_t kLanes = 4;
   using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
   using Flags = int32_t __attribute__((vector_size(kLanes * sizeof(int32_t))));

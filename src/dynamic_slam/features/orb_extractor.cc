@@ -67,7 +67,8 @@ class OrbExtractor::Impl {
     DS_CHECK(mask.empty() || (mask.type() == CV_8UC1 && mask.size() == grey.size()), "type={} {}x{}",
              mask.type(), mask.cols, mask.rows);
     levels_[0].image = grey;  // shares the pixels
-    for (size_t i = 1; i < levels_.size(); ++i) downscalers_[i - 1].Run(levels_[i - 1].image, &levels_[i].image);
+    for (size_t i = 1; i < levels_.size(); ++i)
+      downscalers_[i - 1].Run(levels_[i - 1].image, &levels_[i].image);
     crew_.ForEach(levels_.size(), [&](size_t i, size_t member) {
       Level& level = levels_[i];
       Desk& desk = desks_[member];

@@ -16,8 +16,8 @@ namespace dynamic_slam {
 std::vector<float> OctaveScales(const OrbOptions& options);
 
 // ORB features (Rublee et al. 2011), evenly spread over the image and the pyramid. Keeps its buffers between
-// calls: not for use by two threads at once. Has threads of its own where OrbOptions::threads is above 1; 0 is
-// 1 here.
+// calls: not for use by two threads at once. Has threads of its own where OrbOptions::threads is above 1; 0
+// is 1 here.
 class OrbExtractor {
  public:
   OrbExtractor(const OrbOptions& options, const Camera& camera);

@@ -27,9 +27,10 @@ struct OrbOptions {
               "grey levels", 1, 255,
               "The same while no pose is known and dynamic objects leave fewer keypoints than wanted."});
     visit("threads", self.threads,
-          OptionField{"", 0, 16,
-                      "Threads that share the pyramid's levels; the same keypoints with any. 0: offline as many "
-                      "as there are processors, in realtime two fewer, 4 at most."});
+          OptionField{
+              "", 0, 16,
+              "Threads that share the pyramid's levels; the same keypoints with any. 0: offline as many "
+              "as there are processors, in realtime two fewer, 4 at most."});
   }
 };
 

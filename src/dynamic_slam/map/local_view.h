@@ -53,10 +53,10 @@ class LocalViewBuilder {
   std::vector<uint32_t> entry_of_;  // in the view, by landmark id
   // The landmarks that the view holds already: a bit for each that ever was, all 0 between builds.
   std::vector<uint64_t> is_taken_;
-  std::vector<LandmarkId> fresh_;      // of one keyframe
-  std::vector<LandmarkId> landmarks_;  // of all
+  std::vector<LandmarkId> fresh_;        // of one keyframe
+  std::vector<LandmarkId> landmarks_;    // of all
   std::vector<const Landmark*> copied_;  // in this build
-  std::vector<int> votes_;  // by keyframe id
+  std::vector<int> votes_;               // by keyframe id
   std::vector<KeyframeId> keyframes_;
   std::vector<CovisibleKeyframe> neighbours_;
 };

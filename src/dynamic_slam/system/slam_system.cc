@@ -65,7 +65,8 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
       preparer_(raw_camera, options.image),
       mode_(mode),
       map_(OctaveScales(options.orb)),
-      tracker_(camera(), WithThreads(options.orb, mode), options.tracker, options.dynamic, options.seed, &map_),
+      tracker_(camera(), WithThreads(options.orb, mode), options.tracker, options.dynamic, options.seed,
+               &map_),
       mapper_(camera(), options.mapper, &map_),
       loop_closer_(camera(), options.loop, options.seed, &map_),
       executor_(std::move(executor)) {

@@ -145,6 +145,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     return counts;
   }
   in_box_.assign(n, 0);
+  const float of_most = Combine(Prior(1), 0);  // most keypoints are in no box, and have not moved in any
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
     const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &is_inside);
@@ -154,7 +155,9 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
       if (const uint32_t from = flow.last_keypoints()[i]; options_.motion && from != KeypointFlow::kNone) {
         frame->motion_log_odds[i] = last.motion_log_odds[from];
       }
-      frame->static_probability[i] = Combine(prior_[i], frame->motion_log_odds[i]);
+      frame->static_probability[i] = is_inside || frame->motion_log_odds[i] != 0
+                                         ? Combine(prior_[i], frame->motion_log_odds[i])
+                                         : of_most;
     } else if (is_inside) {
       frame->static_probability[i] = 0;
     }

@@ -30,7 +30,8 @@ class PoseTracker {
   int TrackFromKeyframe(const Map& map, const Keyframe& keyframe, Random& random, Frame* frame);
 
   // Looks for the view's landmarks that the frame does not have yet, and optimises the pose over all.
-  // in_view[k] becomes 1 when the k-th of view.near should be visible in the frame at its pose before this call.
+  // in_view[k] becomes 1 when the k-th of view.near should be visible in the frame at its pose before this
+  // call.
   int TrackLocalMap(const LocalView& view, double radius_px, Frame* frame, std::vector<uint8_t>* in_view);
 
   // Landmarks that were matched and did not fit the last pose that was found.
