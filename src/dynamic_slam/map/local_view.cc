@@ -12,6 +12,9 @@ constexpr size_t kNeighbours = 10;
 // Landmarks lie anywhere in memory, so each is asked for some steps before it is read.
 constexpr size_t kAhead = 12;
 
+// Copies kept beside those in view: in a map that is only read they would become all of it.
+constexpr size_t kMostCopies = 20000;
+
 constexpr uint32_t kNotCopied = 0xffffffffu;
 
 void FetchAhead(const Landmark* landmark) {
@@ -27,7 +30,7 @@ void FetchAhead(const Landmark* landmark) {
 
 void LocalViewBuilder::Build(const Map& map, uint64_t writes, const std::vector<LandmarkId>& seen,
                              int max_keyframes, LocalView* view) {
-  if (writes_ != writes) ForgetCopies(view);
+  if (writes_ != writes || view->ids.size() > kMostCopies) ForgetCopies(view);
   writes_ = writes;
   view->revision = map.revision();
   CountVotes(map, seen);
