@@ -18,7 +18,6 @@ Crew::~Crew() {
     is_ending_ = true;
   }
   begun_.NotifyAll();
-  for (const std::unique_ptr<Worker>& worker : workers_) worker->Drain();
 }
 
 void Crew::Share(size_t count, Pass pass, void* context) {

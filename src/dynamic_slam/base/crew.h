@@ -56,7 +56,7 @@ class Crew {
   size_t running_ DS_GUARDED_BY(mutex_) = 0;
   bool is_ending_ DS_GUARDED_BY(mutex_) = false;
   std::exception_ptr failure_ DS_GUARDED_BY(mutex_);
-  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<std::unique_ptr<Worker>> workers_;  // last: they end before what they use
 };
 
 }  // namespace dynamic_slam
