@@ -66,6 +66,7 @@ class Landmark {
   float min_distance_ = 0, max_distance_ = 0;
   Eigen::Vector3f spread_ = Eigen::Vector3f::Zero();
   Descriptor descriptor_{};
+  bool is_descriptor_stale_ = true;  // observations came or went since it was chosen
 };
 
 }  // namespace dynamic_slam

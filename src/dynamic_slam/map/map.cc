@@ -158,6 +158,7 @@ void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id
     keyframes_.At(other.keyframe).ChangeWeight(keyframe_id, 1);
   }
   landmark.observations_.insert(position, {keyframe_id, keypoint});
+  landmark.is_descriptor_stale_ = true;
   keyframe.SetLandmark(keypoint, landmark_id);
 }
 
@@ -193,6 +194,7 @@ void Map::Unlink(KeyframeId keyframe_id, uint32_t keypoint) {
   const LandmarkId landmark_id = keyframe.landmarks_.at(keypoint);
   Landmark& landmark = landmarks_.At(landmark_id);
   landmark.observations_.erase(FindObservation(landmark.observations_, keyframe_id));
+  landmark.is_descriptor_stale_ = true;
   keyframe.SetLandmark(keypoint, LandmarkId());
   for (const Observation& other : landmark.observations_) {
     keyframe.ChangeWeight(other.keyframe, -1);
@@ -271,9 +273,7 @@ void Map::RefreshLandmark(LandmarkId id) {
     double scale;               // of the keypoint's octave
   };
   std::vector<Sight> sights;
-  std::vector<const Descriptor*> descriptors;
   sights.reserve(count);
-  descriptors.reserve(count);
   for (const Observation& observation : landmark.observations_) {
     const Keyframe& keyframe = keyframes_.At(observation.keyframe);
     const Eigen::Vector3d direction = landmark.position_ - keyframe.CenterInWorld();
@@ -283,7 +283,6 @@ void Map::RefreshLandmark(LandmarkId id) {
     const float scale = octave_scales_[static_cast<size_t>(keyframe.keypoint(observation.keypoint).octave)];
     log_distance_sum += std::log(std::max(distance, 1e-12) * scale);
     sights.push_back({direction, scale});
-    descriptors.push_back(&keyframe.features().descriptors[observation.keypoint]);
   }
   landmark.normal_ = normal.normalized().cast<float>();
   landmark.max_distance_ = static_cast<float>(std::exp(log_distance_sum / static_cast<double>(count)));
@@ -298,7 +297,15 @@ void Map::RefreshLandmark(LandmarkId id) {
   }
   landmark.spread_ = landmark.normal_ / static_cast<float>(std::sqrt(std::max(information, 1e-24)));
 
+  if (!landmark.is_descriptor_stale_) return;
+  std::vector<const Descriptor*> descriptors;
+  descriptors.reserve(count);
+  for (const Observation& observation : landmark.observations_) {
+    const Keyframe& keyframe = keyframes_.At(observation.keyframe);
+    descriptors.push_back(&keyframe.features().descriptors[observation.keypoint]);
+  }
   landmark.descriptor_ = *descriptors[count > 2 ? Medoid(descriptors) : count - 1];
+  landmark.is_descriptor_stale_ = false;
 }
 
 Map::Anchor Map::ResolveKeyframe(KeyframeId id) const {

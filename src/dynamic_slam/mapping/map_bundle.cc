@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 // Landmarks that are refreshed before others may look at the map again.
-constexpr size_t kRefreshedAtOnce = 500;
+constexpr size_t kRefreshedAtOnce = 100;
 
 // A bundle problem made of parts of the map, and the way back.
 class MapBundle {
