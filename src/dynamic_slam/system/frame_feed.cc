@@ -53,12 +53,18 @@ class RealtimeFeed : public FrameFeed {
   void Run(const std::stop_token& token) {
     std::optional<double> last_stamp_s;
     Clock::time_point due = Clock::now();
+    Clock::duration pause{}, reading{};  // the last ones
     while (!token.stop_requested()) {
+      // A camera would not take the processor from tracking, which has just got an image.
+      if (!source_->IsLive() && reading < pause / 4) WaitUntil(due + pause / 2, token);
+      const Clock::time_point start = Clock::now();
       std::optional<SourceImage> image = source_->Next();
       if (!image.has_value()) return;
+      reading = Clock::now() - start;
       if (last_stamp_s.has_value()) {
         const double pause_s = std::clamp(image->timestamp_s - *last_stamp_s, 0.0, kLongestPauseS);
-        due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause_s));
+        pause = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause_s));
+        due += pause;
       }
       last_stamp_s = image->timestamp_s;
       if (!source_->IsLive()) WaitUntil(due, token);
