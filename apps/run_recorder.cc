@@ -41,7 +41,7 @@ void RunRecorder::Watch(const RunProgress& progress) {
 }
 
 RunRecord RunRecorder::Finish(const RunSummary& summary, std::optional<Trajectory> truth) {
-  RunRecord record{.truth = std::move(truth), .frames = std::move(frames_.frames())};
+  RunRecord record{.truth = std::move(truth), .frames = frames_.Frames()};
   if (detector_ == nullptr) return record;
   std::vector<double> stamps_s;
   for (const RunSummary::FrameRecord& frame : summary.frames) stamps_s.push_back(frame.timestamp_s);

@@ -16,7 +16,7 @@ import unittest
 PROGRAM = ""
 FRAMES, FPS = 18000, 10
 KNOWN_AFTER_ROUNDS = 6
-MOST_MB_PER_10_MINUTES = 4  # 0.8 of it are poses and results of frames; the rest lies between blocks that come and go
+MOST_MB_PER_10_MINUTES = 3  # 0.8 of it are poses and results of frames, 0.5 the map
 CAMERA = "model: pinhole\nwidth: 320\nheight: 240\nfps: 10\nfx: 260\nfy: 260\ncx: 159.5\ncy: 119.5\n"
 
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <fmt/core.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "dynamic_slam/report/frame_picture.h"
 
@@ -31,17 +32,32 @@ void FrameChoice::Watch(const RunProgress& progress) {
   for (const DynamicBox& box : progress.result->objects.boxes) {
     if (box.is_dynamic) area_px += box.box.Area();
   }
-  const bool is_new = frames_.empty() || stretch != stretch_;
-  if (!is_new && area_px <= kLarger * most_area_px_) return;
-  if (is_new) frames_.emplace_back();
+  const bool is_first = now_.picture.empty(), is_new = stretch != stretch_;
+  if (!is_first && !is_new && area_px <= kLarger * most_area_px_) return;
+  if (!is_first && is_new) past_.push_back(Pack(now_));
   stretch_ = stretch;
   most_area_px_ = area_px;
-  ChosenFrame& chosen = frames_.back();
-  preparer_.PrepareColour(progress.image->image, &chosen.picture);
-  DrawFrame(progress, &chosen.picture);
+  preparer_.PrepareColour(progress.image->image, &now_.picture);
+  DrawFrame(progress, &now_.picture);
   const TrackingResult& tracking = progress.result->tracking;
-  chosen.caption = fmt::format("frame {}: {}, {} of {} points in dynamic boxes", progress.frame - 1,
-                               Name(tracking.state), tracking.dynamic.InBoxes(), tracking.keypoints);
+  now_.caption = fmt::format("frame {}: {}, {} of {} points in dynamic boxes", progress.frame - 1,
+                             Name(tracking.state), tracking.dynamic.InBoxes(), tracking.keypoints);
+}
+
+FrameChoice::Packed FrameChoice::Pack(const ChosenFrame& frame) {
+  constexpr int kQualityPercent = 95;
+  Packed packed{{}, frame.caption};
+  cv::imencode(".jpg", frame.picture, packed.jpeg, {cv::IMWRITE_JPEG_QUALITY, kQualityPercent});
+  packed.jpeg.shrink_to_fit();
+  return packed;
+}
+
+std::vector<ChosenFrame> FrameChoice::Frames() const {
+  std::vector<ChosenFrame> frames;
+  for (const Packed& packed : past_)
+    frames.push_back({cv::imdecode(packed.jpeg, cv::IMREAD_COLOR), packed.caption});
+  if (!now_.picture.empty()) frames.push_back(now_);
+  return frames;
 }
 
 }  // namespace dynamic_slam

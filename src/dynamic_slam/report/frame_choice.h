@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -26,14 +28,23 @@ class FrameChoice {
   // To be called after each frame.
   void Watch(const RunProgress& progress);
 
-  std::vector<ChosenFrame>& frames() { return frames_; }
+  // The frames chosen so far, in the order of time.
+  std::vector<ChosenFrame> Frames() const;
 
  private:
+  // Of a stretch that is over. As JPEG, a sixth of the memory: a run may last for hours.
+  struct Packed {
+    std::vector<uint8_t> jpeg;
+    std::string caption;
+  };
+
   size_t StretchOf(const RunProgress& progress) const;
+  static Packed Pack(const ChosenFrame& frame);
 
   ImagePreparer preparer_;
   size_t stretches_;
-  std::vector<ChosenFrame> frames_;
+  std::vector<Packed> past_;
+  ChosenFrame now_;  // of the stretch in hand; without a picture before the first frame
   size_t stretch_ = 0;
   double most_area_px_ = 0;
 };
