@@ -199,6 +199,31 @@ TEST(MapTest, ADistanceTellsTheOctave) {
   EXPECT_NEAR(landmark.normal().z(), 1, 1e-6);
 }
 
+TEST(MapTest, TheDescriptorFollowsTheObservations) {
+  Map map = MakeMap();
+  std::vector<Observation> observations;
+  for (uint32_t i = 0; i < 5; ++i) observations.push_back({AddKeyframe(&map, 10), i});
+  const LandmarkId id = AddLandmark(&map, observations);
+  const auto refreshed = [&] {
+    map.RefreshLandmark(id);
+    return map.landmarks().At(id).descriptor();
+  };
+  const auto seen_by = [&](const Observation& observation) {
+    return map.keyframes().At(observation.keyframe).features().descriptors[observation.keypoint];
+  };
+  const Descriptor of_all = refreshed();
+  const auto chosen = std::find_if(observations.begin(), observations.end(),
+                                   [&](const Observation& o) { return seen_by(o) == of_all; });
+  ASSERT_NE(chosen, observations.end());
+  map.Unlink(chosen->keyframe, chosen->keypoint);
+  EXPECT_NE(refreshed(), of_all);
+  map.Link(chosen->keyframe, chosen->keypoint, id);
+  EXPECT_EQ(refreshed(), of_all);
+  // Moving it changes nothing.
+  map.landmarks().At(id).set_position({0, 0, 3});
+  EXPECT_EQ(refreshed(), of_all);
+}
+
 // Two cameras beside each other see it from the sides: by how much its image moves when it moves along the
 // normal.
 TEST(MapTest, TheSpreadIsHowFarItCanBeOffUnseen) {

@@ -20,6 +20,10 @@ constexpr size_t kWaitingImages = 15;
 // A recording may have a gap of hours; nobody waits for that.
 constexpr double kLongestPauseS = 1.0;
 
+// So long after an image no other one is read, if that leaves time to read it: a camera would not take the
+// processor from tracking, which has just got the image. Several times what tracking takes.
+constexpr Clock::duration kLongestRest = std::chrono::milliseconds(20);
+
 class DirectFeed : public FrameFeed {
  public:
   explicit DirectFeed(FrameSource* source) : source_(source) {}
@@ -53,10 +57,9 @@ class RealtimeFeed : public FrameFeed {
   void Run(const std::stop_token& token) {
     std::optional<double> last_stamp_s;
     Clock::time_point due = Clock::now();
-    Clock::duration pause{}, reading{};  // the last ones
+    Clock::duration pause{}, reading{};  // before the last image, and of it
     while (!token.stop_requested()) {
-      // A camera would not take the processor from tracking, which has just got an image.
-      if (!source_->IsLive() && reading < pause / 4) WaitUntil(due + pause / 2, token);
+      if (!source_->IsLive() && reading < pause / 4) WaitUntil(due + std::min(pause / 2, kLongestRest), token);
       const Clock::time_point start = Clock::now();
       std::optional<SourceImage> image = source_->Next();
       if (!image.has_value()) return;
