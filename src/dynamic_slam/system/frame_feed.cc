@@ -59,7 +59,8 @@ class RealtimeFeed : public FrameFeed {
     Clock::time_point due = Clock::now();
     Clock::duration pause{}, reading{};  // before the last image, and of it
     while (!token.stop_requested()) {
-      if (!source_->IsLive() && reading < pause / 4) WaitUntil(due + std::min(pause / 2, kLongestRest), token);
+      if (!source_->IsLive() && reading < pause / 4)
+        WaitUntil(due + std::min(pause / 2, kLongestRest), token);
       const Clock::time_point start = Clock::now();
       std::optional<SourceImage> image = source_->Next();
       if (!image.has_value()) return;
