@@ -1,5 +1,7 @@
 #include "dynamic_slam/map/landmark_fusion.h"
 
+#include <algorithm>
+
 #include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/geometry/chi2.h"
 
@@ -7,6 +9,13 @@ namespace dynamic_slam {
 namespace {
 
 constexpr double kRadiusPx = 3.0;
+
+// The one with more evidence stays.
+void MergeTwo(LandmarkId present, LandmarkId candidate, Map* map) {
+  const bool keep_present = map->landmarks().At(present).observations().size() >=
+                            map->landmarks().At(candidate).observations().size();
+  map->MergeLandmarks(keep_present ? candidate : present, keep_present ? present : candidate);
+}
 
 }  // namespace
 
@@ -17,38 +26,63 @@ FusionCount LandmarkFusion::FuseInto(KeyframeId target_id, const std::vector<Lan
   projector_.SetPose(target.cam_from_world());
   for (const LandmarkId candidate : landmarks) {
     const Landmark* landmark = map->landmarks().Find(candidate);  // may have been merged a moment ago
-    if (landmark == nullptr || landmark->IsSeenBy(target.id())) continue;
-    LandmarkProjection projection;
-    if (!projector_.Project(landmark->position(), landmark->normal(), landmark->min_distance(),
-                            landmark->max_distance(), &projection)) {
-      continue;
-    }
-    const double scale = map->octave_scales()[static_cast<size_t>(projection.octave)];
-    const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
-                              static_cast<float>(kRadiusPx * scale), projection.octave - 1,
-                              projection.octave + 1};
-    const WindowMatch match =
-        FindInWindow(target.features(), target.grid(), window, landmark->descriptor(), {});
-    if (match.distance > kStrictDistance || !(target.StaticProbability(match.keypoint) > 0)) continue;
-    const Keypoint& keypoint = target.keypoint(match.keypoint);
-    const double sigma = map->octave_scales()[static_cast<size_t>(keypoint.octave)];
-    if ((Eigen::Vector2d(keypoint.x, keypoint.y) - projection.px).squaredNorm() > kChi2TwoDof * sigma * sigma)
-      continue;
-
-    const LandmarkId present = target.landmarks()[match.keypoint];
-    if (!present.IsValid()) {
-      map->Link(target.id(), match.keypoint, candidate);
+    if (landmark == nullptr) continue;
+    const std::optional<uint32_t> keypoint = Find(*landmark, target, *map);
+    if (!keypoint.has_value()) continue;
+    if (const LandmarkId present = target.landmarks()[*keypoint]; present.IsValid()) {
+      MergeTwo(present, candidate, map);
+      ++count.merged;
+    } else {
+      map->Link(target_id, *keypoint, candidate);
       map->RefreshLandmark(candidate);
       ++count.linked;
-    } else {
-      // The one with more evidence stays.
-      const bool keep_present =
-          map->landmarks().At(present).observations().size() >= landmark->observations().size();
-      map->MergeLandmarks(keep_present ? candidate : present, keep_present ? present : candidate);
-      ++count.merged;
     }
   }
   return count;
+}
+
+int LandmarkFusion::MergeTwins(KeyframeId target_id, const std::vector<LandmarkId>& landmarks,
+                               uint32_t min_keyframes_between, Map* map) {
+  int merged = 0;
+  const Keyframe& target = map->keyframes().At(target_id);
+  projector_.SetPose(target.cam_from_world());
+  const auto is_near = [&](const Observation& observation) {
+    const uint32_t a = observation.keyframe.value(), b = target_id.value();
+    return std::max(a, b) - std::min(a, b) < min_keyframes_between;
+  };
+  for (const LandmarkId candidate : landmarks) {
+    const Landmark* landmark = map->landmarks().Find(candidate);
+    if (landmark == nullptr || std::ranges::any_of(landmark->observations(), is_near)) continue;
+    const std::optional<uint32_t> keypoint = Find(*landmark, target, *map);
+    if (!keypoint.has_value()) continue;
+    const LandmarkId present = target.landmarks()[*keypoint];
+    if (!present.IsValid()) continue;
+    MergeTwo(present, candidate, map);
+    ++merged;
+  }
+  return merged;
+}
+
+std::optional<uint32_t> LandmarkFusion::Find(const Landmark& landmark, const Keyframe& target,
+                                             const Map& map) const {
+  if (landmark.IsSeenBy(target.id())) return std::nullopt;
+  LandmarkProjection projection;
+  if (!projector_.Project(landmark.position(), landmark.normal(), landmark.min_distance(),
+                          landmark.max_distance(), &projection)) {
+    return std::nullopt;
+  }
+  const double scale = map.octave_scales()[static_cast<size_t>(projection.octave)];
+  const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
+                            static_cast<float>(kRadiusPx * scale), projection.octave - 1,
+                            projection.octave + 1};
+  const WindowMatch match =
+      FindInWindow(target.features(), target.grid(), window, landmark.descriptor(), {});
+  if (match.distance > kStrictDistance || !(target.StaticProbability(match.keypoint) > 0)) return std::nullopt;
+  const Keypoint& keypoint = target.keypoint(match.keypoint);
+  const double sigma = map.octave_scales()[static_cast<size_t>(keypoint.octave)];
+  const double error2_px2 = (Eigen::Vector2d(keypoint.x, keypoint.y) - projection.px).squaredNorm();
+  if (error2_px2 > kChi2TwoDof * sigma * sigma) return std::nullopt;
+  return match.keypoint;
 }
 
 }  // namespace dynamic_slam

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "dynamic_slam/geometry/camera.h"
@@ -13,16 +14,24 @@ struct FusionCount {
   int merged = 0;  // pairs of landmarks that were one
 };
 
-// Projects landmarks into a keyframe; links what is found, merges what is twice. Passes over landmarks that
-// are gone.
+// Projects landmarks into a keyframe. Passes over those that are gone.
 class LandmarkFusion {
  public:
   LandmarkFusion(const Camera& camera, const std::vector<float>& octave_scales)
       : projector_(camera, octave_scales) {}
 
+  // Links what is found, merges what is twice.
   FusionCount FuseInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, Map* map);
 
+  // Merges what is twice and was seen, the second time, `min_keyframes_between` keyframes or more before or
+  // after the target. Returns the pairs.
+  int MergeTwins(KeyframeId target, const std::vector<LandmarkId>& landmarks, uint32_t min_keyframes_between,
+                 Map* map);
+
  private:
+  // The target's keypoint that shows the landmark, though the map does not know it.
+  std::optional<uint32_t> Find(const Landmark& landmark, const Keyframe& target, const Map& map) const;
+
   LandmarkProjector projector_;
 };
 

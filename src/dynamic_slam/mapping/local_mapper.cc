@@ -16,6 +16,13 @@ constexpr uint32_t kProbationKeyframes = 3;
 constexpr double kMinFoundRatio = 0.25;
 constexpr size_t kMinObservations = 3;
 
+// Where landmarks are looked for that are one: in a keyframe's neighbours, and in theirs. Mapping has fused
+// keyframes that follow each other when they came: what is still two there is mostly two, and on a road, where
+// all is seen from ahead, merging it made errors up to 8% larger.
+constexpr size_t kTwinNeighbours = 20, kTwinNextNeighbours = 5;
+constexpr uint32_t kMinTwinDistance = 3;
+constexpr int kTwinRounds = 2;
+
 // Other keyframes that must see a landmark at the same or a finer scale for it to count as redundant.
 constexpr int kRedundantViews = 3;
 
@@ -49,7 +56,38 @@ MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
 }
 
 BundleSummary LocalMapper::Finish(const std::function<bool()>& should_stop) {
-  return AdjustAll(camera_, options_, should_stop, map_);
+  BundleSummary summary = AdjustAll(camera_, options_, should_stop, map_);
+  // What has moved together shows more that is twice.
+  for (int round = 0; round < kTwinRounds && summary.usable && MergeTwins(should_stop) > 0; ++round)
+    summary = AdjustAll(camera_, options_, should_stop, map_);
+  return summary;
+}
+
+int LocalMapper::MergeTwins(const std::function<bool()>& should_stop) {
+  DS_TRACE("mapping/merge twins");
+  std::vector<KeyframeId> keyframes;
+  map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) { keyframes.push_back(keyframe.id()); });
+  int merged = 0;
+  std::vector<LandmarkId> landmarks;
+  for (const KeyframeId target : keyframes) {
+    if (should_stop && should_stop()) break;
+    const auto map = map_->Write();
+    landmarks.clear();
+    const auto add = [&](KeyframeId id) {
+      map->keyframes().At(id).ForEachLandmark(
+          [&](uint32_t, LandmarkId landmark) { landmarks.push_back(landmark); });
+    };
+    for (const CovisibleKeyframe& neighbour : map->keyframes().At(target).BestCovisible(kTwinNeighbours)) {
+      add(neighbour.id);
+      for (const CovisibleKeyframe& next : map->keyframes().At(neighbour.id).BestCovisible(kTwinNextNeighbours))
+        add(next.id);
+    }
+    std::ranges::sort(landmarks);
+    const auto repeated = std::ranges::unique(landmarks);
+    landmarks.erase(repeated.begin(), repeated.end());
+    merged += fusion_.MergeTwins(target, landmarks, kMinTwinDistance, map.get());
+  }
+  return merged;
 }
 
 // What tracking found in the keyframe looks a little different since; a few at a time, as tracking may wait.

@@ -33,7 +33,8 @@ class LocalMapper {
   // says so, bundle adjustment ends with what it has.
   MappingResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
 
-  // Bundle adjustment over everything, when the sequence is over.
+  // When the sequence is over: bundle adjustment over everything, and again with those landmarks made one that
+  // turn out to be.
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
  private:
@@ -63,6 +64,8 @@ class LocalMapper {
   // are not found any more where they should be.
   void CullMovedLandmarks(KeyframeId current, Map* map, MappingResult* result);
   void CullRecentLandmarks(KeyframeId current, Map* map, MappingResult* result);
+  // Over the whole map. Returns the pairs.
+  int MergeTwins(const std::function<bool()>& should_stop);
   bool IsRedundant(const Map& map, const Keyframe& keyframe) const;
 
   Camera camera_;

@@ -18,6 +18,12 @@ constexpr double kMinPreference = 5.0;
 // do.
 constexpr double kMinTryPreference = 8.0;
 
+// A start's views are so many times the readout of a rolling shutter apart at least, so that what it does to
+// an image is a fifth of what the camera's motion does between the views. Of 82 starts among people, 10 of 36
+// with less erred by more than 5% of the path in their first second, the worst by 24%, and 6 of 46 with more,
+// the worst by 8%.
+constexpr double kMinReadouts = 5.0;
+
 }  // namespace
 
 Initializer::Initializer(const Camera& camera, const InitializerOptions& options,
@@ -116,6 +122,12 @@ std::optional<InitialProposal> Initializer::ProposeFrom(size_t index, const Fram
   }
   std::optional<InitialProposal> proposal = ChooseStructure(motion, views, limits.min_points);
   if (!proposal.has_value()) return std::nullopt;
+  const double span_s = views.last.timestamp_s - views.reference_timestamp_s;
+  if (const double needed_s = kMinReadouts * camera_.readout_s; span_s < needed_s) {
+    reason_ = fmt::format("initialising: {:.2f} s since the first view < {:.2f} s, as a rolling shutter bends both",
+                          span_s, needed_s);
+    return std::nullopt;
+  }
   reason_ = fmt::format("initialised{}: {} points, parallax {:.1f} deg, {} views",
                         proposal->is_certain ? "" : " for the time being", proposal->structure.points,
                         motion.parallax_deg, views.between.size() + 2);
