@@ -75,9 +75,9 @@ std::optional<uint32_t> LandmarkFusion::Find(const Landmark& landmark, const Key
   const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
                             static_cast<float>(kRadiusPx * scale), projection.octave - 1,
                             projection.octave + 1};
-  const WindowMatch match =
-      FindInWindow(target.features(), target.grid(), window, landmark.descriptor(), {});
-  if (match.distance > kStrictDistance || !(target.StaticProbability(match.keypoint) > 0)) return std::nullopt;
+  const WindowMatch match = FindInWindow(target.features(), target.grid(), window, landmark.descriptor(), {});
+  if (match.distance > kStrictDistance || !(target.StaticProbability(match.keypoint) > 0))
+    return std::nullopt;
   const Keypoint& keypoint = target.keypoint(match.keypoint);
   const double sigma = map.octave_scales()[static_cast<size_t>(keypoint.octave)];
   const double error2_px2 = (Eigen::Vector2d(keypoint.x, keypoint.y) - projection.px).squaredNorm();

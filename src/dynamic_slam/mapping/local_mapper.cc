@@ -17,8 +17,8 @@ constexpr double kMinFoundRatio = 0.25;
 constexpr size_t kMinObservations = 3;
 
 // Where landmarks are looked for that are one: in a keyframe's neighbours, and in theirs. Mapping has fused
-// keyframes that follow each other when they came: what is still two there is mostly two, and on a road, where
-// all is seen from ahead, merging it made errors up to 8% larger.
+// keyframes that follow each other when they came: what is still two there is mostly two, and on a road,
+// where all is seen from ahead, merging it made errors up to 8% larger.
 constexpr size_t kTwinNeighbours = 20, kTwinNextNeighbours = 5;
 constexpr uint32_t kMinTwinDistance = 3;
 constexpr int kTwinRounds = 2;
@@ -79,7 +79,8 @@ int LocalMapper::MergeTwins(const std::function<bool()>& should_stop) {
     };
     for (const CovisibleKeyframe& neighbour : map->keyframes().At(target).BestCovisible(kTwinNeighbours)) {
       add(neighbour.id);
-      for (const CovisibleKeyframe& next : map->keyframes().At(neighbour.id).BestCovisible(kTwinNextNeighbours))
+      for (const CovisibleKeyframe& next :
+           map->keyframes().At(neighbour.id).BestCovisible(kTwinNextNeighbours))
         add(next.id);
     }
     std::ranges::sort(landmarks);

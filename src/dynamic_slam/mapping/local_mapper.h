@@ -33,8 +33,8 @@ class LocalMapper {
   // says so, bundle adjustment ends with what it has.
   MappingResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
 
-  // When the sequence is over: bundle adjustment over everything, and again with those landmarks made one that
-  // turn out to be.
+  // When the sequence is over: bundle adjustment over everything, and again with those landmarks made one
+  // that turn out to be.
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
  private:

@@ -124,8 +124,9 @@ std::optional<InitialProposal> Initializer::ProposeFrom(size_t index, const Fram
   if (!proposal.has_value()) return std::nullopt;
   const double span_s = views.last.timestamp_s - views.reference_timestamp_s;
   if (const double needed_s = kMinReadouts * camera_.readout_s; span_s < needed_s) {
-    reason_ = fmt::format("initialising: {:.2f} s since the first view < {:.2f} s, as a rolling shutter bends both",
-                          span_s, needed_s);
+    reason_ =
+        fmt::format("initialising: {:.2f} s since the first view < {:.2f} s, as a rolling shutter bends both",
+                    span_s, needed_s);
     return std::nullopt;
   }
   reason_ = fmt::format("initialised{}: {} points, parallax {:.1f} deg, {} views",
