@@ -72,7 +72,7 @@ FeatureSet Extract(const cv::Mat& image, const Camera& camera, const cv::Mat& ma
 
 bool SameBytes(const FeatureSet& a, const FeatureSet& b) {
   return a.size() == b.size() && a.descriptors == b.descriptors &&
-         std::memcmp(a.keypoints.data(), b.keypoints.data(), a.size() * sizeof(Keypoint)) == 0;
+         (a.size() == 0 || std::memcmp(a.keypoints.data(), b.keypoints.data(), a.size() * sizeof(Keypoint)) == 0);
 }
 
 double AngleDifference(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }

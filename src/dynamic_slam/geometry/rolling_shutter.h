@@ -23,7 +23,7 @@ SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b);
 // A rolling shutter reads the rows of an image one after the other, for Camera::readout_s in all, and a pose
 // is that of the camera when it reads the middle one. Returns where (ideal px) the camera would have seen
 // then what it saw at ideal_px in the raw row raw_y. inverse_depth: of what it shows, along the optical axis;
-// 0: far away. To second order in the rotation since: within 0.05 px at 2 rad/s and 1 m/s about each axis,
+// 0: far away. To second order in the rotation since: within 0.1 px at 2 rad/s and 1 m/s about each axis,
 // 0.5 m from what is seen, with 23 ms (rolling_shutter_test).
 Eigen::Vector2d AtMiddleRow(const Camera& camera, const SteadyMotion& motion, const Eigen::Vector2d& ideal_px,
                             double raw_y, double inverse_depth);

@@ -343,6 +343,67 @@ TEST(MapBundleTest, WhatCameMeanwhileMovesAlong) {
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
 }
 
+// The camera passes a place of which only a part is known again; what nobody knows again becomes landmarks
+// anew.
+struct PlaceMappedTwice {
+  PlaceMappedTwice() {
+    for (int i = 0; i < 8; ++i) ids.push_back(scene.Add(SidewaysPose(0.1 * (i % 4))));
+    scene.AddLandmarks(0, kPoints / 2, ids);
+    for (const std::vector<KeyframeId>& visit : {std::vector(ids.begin(), ids.begin() + 4),
+                                                 std::vector(ids.begin() + 4, ids.end())})
+      scene.AddLandmarks(kPoints / 2, kPoints, visit);
+  }
+
+  // Points that several landmarks show, and landmarks that show several points.
+  std::pair<int, int> CountTwinsAndMistakes() const {
+    std::vector<int> landmarks_of(kPoints, 0);
+    int mistakes = 0;
+    scene.map.landmarks().ForEach([&](const Landmark& landmark) {
+      const uint32_t point = scene.PointOf(landmark.observations().front());
+      ++landmarks_of[point];
+      mistakes += std::ranges::any_of(landmark.observations(), [&](const Observation& observation) {
+        return scene.PointOf(observation) != point;
+      });
+    });
+    const auto twins = std::ranges::count_if(landmarks_of, [](int n) { return n > 1; });
+    return {static_cast<int>(twins), mistakes};
+  }
+
+  SyntheticWorld world{kPoints};
+  SyntheticMap scene{&world};
+  std::vector<KeyframeId> ids;
+};
+
+TEST(LocalMapperTest, InTheEndWhatIsTwiceBecomesOne) {
+  PlaceMappedTwice place;
+  const int twins = place.CountTwinsAndMistakes().first;
+  ASSERT_GT(twins, 150);
+  LocalMapper mapper(place.world.camera(), {}, &place.scene.shared_map);
+  EXPECT_TRUE(mapper.Finish().usable);
+  const auto [left, mistakes] = place.CountTwinsAndMistakes();
+  EXPECT_LT(left, twins / 50);
+  EXPECT_LE(mistakes, twins / 100);
+  EXPECT_THAT(place.scene.map.Validate(), IsEmpty());
+}
+
+TEST(LocalMapperTest, StoppedInTheEndItMergesNothing) {
+  PlaceMappedTwice place;
+  const auto before = place.CountTwinsAndMistakes();
+  LocalMapper(place.world.camera(), {}, &place.scene.shared_map).Finish([] { return true; });
+  EXPECT_EQ(place.CountTwinsAndMistakes(), before);
+  EXPECT_THAT(place.scene.map.Validate(), IsEmpty());
+}
+
+TEST(LandmarkFusionTest, TwinsAreMergedOnlyWhereKeyframesLieBetween) {
+  PlaceMappedTwice place;
+  LandmarkFusion fusion(place.world.camera(), place.scene.map.octave_scales());
+  const std::vector<LandmarkId> first_visit = place.scene.map.keyframes().At(place.ids[0]).landmarks();
+  // From any keyframe of the first visit to the second one's first it is 4 at most, to its last 4 or more.
+  EXPECT_EQ(fusion.MergeTwins(place.ids[4], first_visit, 5, &place.scene.map), 0);
+  EXPECT_GT(fusion.MergeTwins(place.ids[7], first_visit, 4, &place.scene.map), 100);
+  EXPECT_THAT(place.scene.map.Validate(), IsEmpty());
+}
+
 TEST(LocalMapperTest, ARedundantKeyframeGoesAndItsFramesStay) {
   SyntheticWorld world(400);
   SyntheticMap scene(&world);
