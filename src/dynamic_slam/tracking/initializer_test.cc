@@ -141,6 +141,28 @@ TEST_F(InitializerTest, ARollingShutterThatIsKnownBendsNoStart) {
   EXPECT_EQ(known.Misplaced(), 0) << "fusion and loops look for keypoints in the grid";
 }
 
+TEST_F(InitializerTest, ARollingShutterStartsFromViewsThatAreSeveralReadoutsApart) {
+  // Of views a second apart with steps of 0.15, how many it takes; with what it says before the last.
+  const auto views_to_start = [](double readout_s) {
+    SyntheticWorld world(1500, 0.1);
+    Camera camera = world.camera();
+    camera.readout_s = readout_s;
+    Initializer initializer(camera, {}, SyntheticWorld::OctaveScales());
+    Random random(1);
+    std::string reason;
+    for (int i = 0; i < 6; ++i) {
+      const SyntheticView view = world.See(SidewaysPose(0.15 * i));
+      if (initializer.Propose(view.frame, random).has_value()) return std::pair(i + 1, reason);
+      reason = initializer.reason();
+    }
+    return std::pair(7, reason);
+  };
+  EXPECT_EQ(views_to_start(0.001).first, 3);
+  const auto [views, reason] = views_to_start(0.78);  // 3.9 s: between the first view and the fifth are 4
+  EXPECT_EQ(views, 5);
+  EXPECT_THAT(reason, HasSubstr("3.00 s since the first view < 3.90 s"));
+}
+
 TEST_F(InitializerTest, ACameraThatTurnsOnlyWaits) {
   for (int i = 0; i < 12; ++i) EXPECT_FALSE(Try(Rigid3(ExpSo3({0, 0.01 * i, 0}), {0, 0, 0})));
   EXPECT_THAT(initializer_.reason(), HasSubstr("parallax"));
