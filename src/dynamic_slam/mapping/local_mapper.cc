@@ -83,9 +83,8 @@ int LocalMapper::MergeTwins(const std::function<bool()>& should_stop) {
            map->keyframes().At(neighbour.id).BestCovisible(kTwinNextNeighbours))
         add(next.id);
     }
-    std::ranges::sort(landmarks);
-    const auto repeated = std::ranges::unique(landmarks);
-    landmarks.erase(repeated.begin(), repeated.end());
+    std::sort(landmarks.begin(), landmarks.end());
+    landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
     merged += fusion_.MergeTwins(target, landmarks, kMinTwinDistance, map.get());
   }
   return merged;
