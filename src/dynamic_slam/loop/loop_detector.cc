@@ -37,12 +37,12 @@ double Median(std::vector<double> values) {
 }
 
 std::vector<LandmarkId> LandmarksAbout(const Map& map, const Keyframe& keyframe, size_t neighbours) {
-  std::vector<uint8_t> is_taken(map.landmarks().CreatedCount(), 0);
+  std::vector<bool> is_taken(map.landmarks().CreatedCount(), false);
   std::vector<LandmarkId> landmarks;
   const auto add = [&](const Keyframe& from) {
     for (const LandmarkId id : from.landmarks()) {
-      if (!id.IsValid() || is_taken[id.value()] != 0) continue;
-      is_taken[id.value()] = 1;
+      if (!id.IsValid() || is_taken[id.value()]) continue;
+      is_taken[id.value()] = true;
       landmarks.push_back(id);
     }
   };

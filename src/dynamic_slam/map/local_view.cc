@@ -12,10 +12,9 @@ constexpr size_t kNeighbours = 10;
 // Landmarks lie anywhere in memory, so each is asked for some steps before it is read.
 constexpr size_t kAhead = 12;
 
-// Copies kept beside those in view: in a map that is only read they would become all of it.
-constexpr size_t kMostCopies = 20000;
-
-constexpr uint32_t kNotCopied = 0xffffffffu;
+// Copies kept beside those in view, about as many as are in view: in a map that is only read they would become
+// all of it.
+constexpr size_t kMostCopiesBeside = 4000;
 
 void FetchAhead(const Landmark* landmark) {
 #ifdef __GNUC__
@@ -30,7 +29,7 @@ void FetchAhead(const Landmark* landmark) {
 
 void LocalViewBuilder::Build(const Map& map, uint64_t writes, const std::vector<LandmarkId>& seen,
                              int max_keyframes, LocalView* view) {
-  if (writes_ != writes || view->ids.size() > kMostCopies) ForgetCopies(view);
+  if (writes_ != writes || view->ids.size() > view->near.size() + kMostCopiesBeside) ForgetCopies(view);
   writes_ = writes;
   view->revision = map.revision();
   CountVotes(map, seen);
@@ -101,17 +100,17 @@ void LocalViewBuilder::CollectLandmarks(const Map& map) {
 }
 
 void LocalViewBuilder::CopyLandmarks(const Map& map, LocalView* view) {
-  entry_of_.resize(map.landmarks().CreatedCount(), kNotCopied);
+  slots_.resize(kSlots);
   view->near.clear();
   copied_.clear();
   for (const LandmarkId id : landmarks_) {
-    uint32_t& entry = entry_of_[id.value()];
-    if (entry == kNotCopied) {
-      entry = static_cast<uint32_t>(view->ids.size());
+    Slot& slot = slots_[id.value() % kSlots];
+    if (slot.id != id) {
+      slot = {id, static_cast<uint32_t>(view->ids.size())};
       view->ids.push_back(id);
       copied_.push_back(&map.landmarks().At(id));
     }
-    view->near.push_back(entry);
+    view->near.push_back(slot.entry);
   }
   for (size_t i = 0; i < copied_.size(); ++i) {
     if (i + kAhead < copied_.size()) FetchAhead(copied_[i + kAhead]);
@@ -127,7 +126,7 @@ void LocalViewBuilder::CopyLandmarks(const Map& map, LocalView* view) {
 }
 
 void LocalViewBuilder::ForgetCopies(LocalView* view) {
-  for (const LandmarkId id : view->ids) entry_of_[id.value()] = kNotCopied;
+  for (const LandmarkId id : view->ids) slots_[id.value() % kSlots] = {};
   view->ids.clear();
   view->positions.clear();
   view->normals.clear();

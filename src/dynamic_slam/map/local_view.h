@@ -49,8 +49,16 @@ class LocalViewBuilder {
   void CopyLandmarks(const Map& map, LocalView* view);
   void ForgetCopies(LocalView* view);
 
+  // Where the view has the copy of a landmark. Of two whose ids share a slot the later has it, and the other
+  // is copied anew: a table of all ids would grow for as long as the map is worked on.
+  struct Slot {
+    LandmarkId id;
+    uint32_t entry = 0;
+  };
+  static constexpr uint32_t kSlots = 1 << 15;
+
   std::optional<uint64_t> writes_;  // to the map, when the copies were made
-  std::vector<uint32_t> entry_of_;  // in the view, by landmark id
+  std::vector<Slot> slots_;         // by landmark id modulo kSlots
   // The landmarks that the view holds already: a bit for each that ever was, all 0 between builds.
   std::vector<uint64_t> is_taken_;
   std::vector<LandmarkId> fresh_;        // of one keyframe

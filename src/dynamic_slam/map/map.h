@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -132,7 +133,7 @@ class Map {
   PlaceIndex places_;
   std::vector<KeyframeId> origins_{KeyframeId()};  // by part
   MergeLog merges_;
-  std::vector<Anchor> heirs_;  // by keyframe id; not valid while the keyframe lives
+  std::deque<Anchor> heirs_;  // by keyframe id; not valid while the keyframe lives
 };
 
 }  // namespace dynamic_slam

@@ -297,6 +297,26 @@ TEST(LocalViewTest, CopiesAgainOnlyWhatMayHaveChanged) {
   EXPECT_EQ(position(0), after);
 }
 
+// The builder's table has 2^15 slots.
+TEST(LocalViewTest, HoldsLandmarksWhoseIdsShareASlot) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10);
+  const LandmarkId old = AddLandmark(&map, {{a, 0}});
+  while (map.landmarks().CreatedCount() % (1 << 15) != old.value()) {
+    map.EraseLandmark(map.AddLandmark({0, 0, 1}, a).id());
+  }
+  const LandmarkId young = AddLandmark(&map, {{a, 1}});
+  map.landmarks().At(young).set_position({1, 2, 3});
+  LocalView view;
+  LocalViewBuilder builder;
+  for (const uint64_t writes : {1, 1, 2}) {
+    builder.Build(map, writes, {old, young}, 1, &view);
+    ASSERT_THAT(Near(view), testing::ElementsAre(old, young));
+    EXPECT_EQ(view.positions[view.near[0]], map.landmarks().At(old).position());
+    EXPECT_EQ(view.positions[view.near[1]], map.landmarks().At(young).position());
+  }
+}
+
 TEST(FrameTest, AMergedLandmarkIsLinkedOnce) {
   Map map = MakeMap();
   const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), c = AddKeyframe(&map, 10);

@@ -22,7 +22,7 @@ class MapBundle {
       : epoch_(map.epoch()),
         revision_(map.revision()),
         pose_of_(map.keyframes().CreatedCount(), kNone),
-        seen_(map.landmarks().CreatedCount(), 0) {}
+        seen_(map.landmarks().CreatedCount(), false) {}
 
   // Of everything: all that others compute from the map meanwhile is out of date when it ends.
   void SetWhole() { is_whole_ = true; }
@@ -35,8 +35,8 @@ class MapBundle {
 
   void AddLandmarksOf(const Map& map, KeyframeId id) {
     map.keyframes().At(id).ForEachLandmark([&](uint32_t, LandmarkId landmark) {
-      if (seen_[landmark.value()] != 0) return;
-      seen_[landmark.value()] = 1;
+      if (seen_[landmark.value()]) return;
+      seen_[landmark.value()] = true;
       landmarks_.push_back(landmark);
     });
   }
@@ -165,7 +165,7 @@ class MapBundle {
   BundleProblem problem_;
   std::vector<uint8_t> is_outlier_;
   std::vector<uint32_t> pose_of_;  // by keyframe id
-  std::vector<uint8_t> seen_;      // by landmark id
+  std::vector<bool> seen_;         // by landmark id
   std::vector<KeyframeId> keyframes_;
   std::vector<LandmarkId> landmarks_;
   std::vector<Link> links_;

@@ -155,10 +155,10 @@ Json EventsOf(const Run& run) {
       if (frame.state == TrackingState::kTracking) {
         add(stamp_s, "start", last == TrackingState::kLost ? "found again" : "started");
       } else if (last == TrackingState::kTracking) {
-        add(stamp_s, "lost", frame.reason);
+        add(stamp_s, "lost", std::string(frame.Reason()));
       }
     }
-    if (frame.map_was_erased) add(stamp_s, "reset", frame.reason);
+    if (frame.map_was_erased) add(stamp_s, "reset", std::string(frame.Reason()));
     if (frame.keyframe_reason != KeyframeReason::kNone) {
       add(stamp_s, "keyframe", fmt::format("keyframe: {}", Name(frame.keyframe_reason)));
     }
@@ -246,9 +246,9 @@ Json KeypointsSection(const Run& run) {
   using Frame = RunSummary::FrameRecord;
   const FrameCharts charts(run);
   const Json stack = {
-      charts.Series("static", "c3", [](const Frame& f) { return f.dynamic.outside; }),
-      charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.dynamic.kept; }),
-      charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.dynamic.culled; })};
+      charts.Series("static", "c3", [](const Frame& f) { return f.outside; }),
+      charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.kept; }),
+      charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.culled; })};
   const Json inliers = {
       charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })};
   return ChartsSection(

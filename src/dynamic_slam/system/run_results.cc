@@ -97,7 +97,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   return json;
 }
 
-std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
+std::string LoopsCsv(const std::deque<LoopAttempt>& attempts) {
   std::string csv =
       "timestamp,keyframe,candidate,candidate_timestamp,score,matches,sim3_inliers,visible,inliers,"
       "confirming,"
@@ -132,16 +132,15 @@ std::vector<Eigen::Vector3f> LandmarksOfMainPart(const SlamSystem& system, doubl
 }  // namespace
 
 std::string FramesCsvHeader() {
-  return "timestamp,state,keypoints,inliers,keyframe,detection,objects,static,dynamic,culled,kept,tracking_"
-         "ms,"
-         "reason\n";
+  return "timestamp,state,keypoints,inliers,keyframe,detection,objects,static,dynamic,culled,kept,"
+         "tracking_ms,reason\n";
 }
 
 std::string FramesCsvRow(const RunSummary::FrameRecord& frame) {
   return fmt::format("{:.9f},{},{},{},{},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s,
                      Name(frame.state), frame.keypoints, frame.inliers, Name(frame.keyframe_reason),
-                     Name(frame.detection), frame.objects, frame.dynamic.outside, frame.dynamic.InBoxes(),
-                     frame.dynamic.culled, frame.dynamic.kept, frame.tracking_ms, frame.reason);
+                     Name(frame.detection), frame.objects, frame.outside, frame.kept + frame.culled, frame.culled,
+                     frame.kept, frame.tracking_ms, frame.Reason());
 }
 
 void WriteTrajectories(const std::filesystem::path& folder, std::span<const Trajectory> trajectories) {

@@ -1,13 +1,17 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <exception>
 #include <filesystem>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dynamic_slam/geometry/metric_scale.h"
@@ -54,19 +58,27 @@ struct RunSummary {
   std::string last_reason;             // what tracking said last, while it had no pose
   std::vector<SourceProblem> skipped;  // images that could not be used
 
-  // One line of frames.csv. Small, as a run may last for hours.
+  // One line of frames.csv. Small, as a run may last for hours; a count that does not fit is the greatest that
+  // does.
   struct FrameRecord {
+    using Count = uint16_t;
+
     double timestamp_s = 0;
-    std::string reason;
-    float tracking_ms = 0;
-    int32_t keypoints = 0, inliers = 0;
-    DynamicKeypoints dynamic;
-    int32_t objects = 0;                            // seen or believed to be in the frame
+    std::shared_ptr<const std::string> reason;      // why there is no pose, for the frames that have none
     uint32_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
+    float tracking_ms = 0;
+    Count keypoints = 0, inliers = 0;
+    Count outside = 0, kept = 0, culled = 0;  // of the keypoints (DynamicKeypoints)
+    Count objects = 0;                        // seen or believed to be in the frame
     TrackingState state = TrackingState::kInitialising;
     KeyframeReason keyframe_reason = KeyframeReason::kNone;
     DetectionState detection = DetectionState::kOff;
     bool map_was_erased = false;  // the part of the map that the camera was in
+
+    static Count Counted(int64_t number) {
+      return static_cast<Count>(std::clamp<int64_t>(number, 0, std::numeric_limits<Count>::max()));
+    }
+    std::string_view Reason() const { return reason == nullptr ? std::string_view() : *reason; }
   };
   std::deque<FrameRecord> frames;
   double Coverage() const {  // live

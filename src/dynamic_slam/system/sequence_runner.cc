@@ -57,15 +57,20 @@ class FrameLog {
     was_tracking_ = is_tracking;
     summary_->most_keyframes_waiting = std::max(summary_->most_keyframes_waiting, result.keyframes_waiting);
     const auto [map_keyframes, map_landmarks] = SizesOf(map);
+    using Record = RunSummary::FrameRecord;
     summary_->frames.push_back({.timestamp_s = timestamp_s,
-                                .reason = tracking.reason,
-                                .tracking_ms = static_cast<float>(result.tracking_ms),
-                                .keypoints = tracking.keypoints,
-                                .inliers = tracking.inliers,
-                                .dynamic = tracking.dynamic,
-                                .objects = static_cast<int32_t>(result.objects.boxes.size()),
+                                .reason = tracking.reason.empty()
+                                              ? nullptr
+                                              : std::make_shared<const std::string>(tracking.reason),
                                 .map_keyframes = map_keyframes,
                                 .map_landmarks = map_landmarks,
+                                .tracking_ms = static_cast<float>(result.tracking_ms),
+                                .keypoints = Record::Counted(tracking.keypoints),
+                                .inliers = Record::Counted(tracking.inliers),
+                                .outside = Record::Counted(tracking.dynamic.outside),
+                                .kept = Record::Counted(tracking.dynamic.kept),
+                                .culled = Record::Counted(tracking.dynamic.culled),
+                                .objects = Record::Counted(std::ssize(result.objects.boxes)),
                                 .state = tracking.state,
                                 .keyframe_reason = tracking.keyframe_reason,
                                 .detection = result.objects.state,

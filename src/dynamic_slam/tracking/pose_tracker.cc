@@ -106,18 +106,13 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
   in_view->resize(view.size());
   std::fill(in_view->begin(), in_view->end(), uint8_t{0});
   TakeUnusable(*frame);
-  uint32_t max_id = 0;
-  for (const uint32_t i : view.near) max_id = std::max(max_id, view.ids[i].value());
-  for (const LandmarkId id : frame->landmarks) {
-    if (id.IsValid()) max_id = std::max(max_id, id.value());
-  }
-  landmark_known_.resize(max_id + 1);
-  std::fill(landmark_known_.begin(), landmark_known_.end(), uint8_t{0});
+  known_landmarks_.clear();
   for (size_t i = 0; i < frame->landmarks.size(); ++i) {
     if (!frame->landmarks[i].IsValid()) continue;
     taken_[i] = 1;
-    landmark_known_[frame->landmarks[i].value()] = 1;
+    known_landmarks_.push_back(frame->landmarks[i]);
   }
+  MarkKnown(true);
 
   projector_.SetPose(frame->cam_from_world);
   for (size_t k = 0; k < view.size(); ++k) {
@@ -128,7 +123,7 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
       continue;
     }
     (*in_view)[k] = 1;
-    if (landmark_known_[view.ids[i].value()] != 0) continue;
+    if (IsKnown(view.ids[i])) continue;
     const float scale = octave_scales_[static_cast<size_t>(projection.octave)];
     const SearchWindow window{static_cast<float>(projection.px.x()), static_cast<float>(projection.px.y()),
                               static_cast<float>(radius_px) * scale, projection.octave - 1,
@@ -143,7 +138,15 @@ int PoseTracker::TrackLocalMap(const LocalView& view, double radius_px, Frame* f
     frame->spreads[match.keypoint] = view.spreads[i];
     frame->static_log_odds[match.keypoint] = view.static_log_odds[i];
   }
+  MarkKnown(false);
   return OptimisePose(frame->cam_from_world, frame);
+}
+
+void PoseTracker::MarkKnown(bool is_known) {
+  for (const LandmarkId id : known_landmarks_) {
+    if (id.value() >= is_known_.size()) is_known_.resize(id.value() + 1);
+    is_known_[id.value()] = is_known;
+  }
 }
 
 int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame) {

@@ -54,6 +54,10 @@ class PoseTracker {
   // Where somebody may stand before the landmark, any corner may be found in its place.
   int MaxDistance(const Frame& frame, uint32_t keypoint) const;
 
+  // Of known_landmarks_.
+  void MarkKnown(bool is_known);
+  bool IsKnown(LandmarkId id) const { return id.value() < is_known_.size() && is_known_[id.value()]; }
+
   // Keypoints that are not to be used count as taken.
   void TakeUnusable(const Frame& frame);
 
@@ -70,7 +74,8 @@ class PoseTracker {
   std::vector<Candidate> candidates_;
   std::vector<uint8_t> taken_;
   std::vector<LandmarkId> rejected_;
-  std::vector<uint8_t> landmark_known_;
+  std::vector<LandmarkId> known_landmarks_;  // that the frame had before TrackLocalMap
+  std::vector<bool> is_known_;               // by landmark id; all false between calls
   RotationConsistency rotation_;
 };
 

@@ -94,6 +94,13 @@ TEST_F(PoseTrackerTest, TheLocalMapAddsWhatTheFrameDoesNotHave) {
   ExpectPose(many, 0.8);
   ASSERT_EQ(in_view.size(), view.size());
   EXPECT_GE(std::count(in_view.begin(), in_view.end(), 1), many);
+  std::vector<LandmarkId> found = frame_.frame.landmarks;
+  std::erase(found, LandmarkId());
+  std::sort(found.begin(), found.end());
+  EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end()) << "each once";
+  // What this frame had does not count for the next.
+  frame_.frame.ClearLandmarks();
+  EXPECT_EQ(tracker_.TrackLocalMap(view, 4, &frame_.frame, &in_view), many);
 }
 
 }  // namespace
