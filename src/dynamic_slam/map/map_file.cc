@@ -40,6 +40,9 @@ bool IsAtRest(const Landmark& landmark) { return landmark.static_log_odds >= 0; 
 
 class Writer {
  public:
+  // The room that the whole is expected to take.
+  explicit Writer(size_t bytes = 0) { bytes_.reserve(bytes); }
+
   template <class T>
   void Put(const T& value) {
     static_assert(std::is_arithmetic_v<T>);
@@ -49,15 +52,19 @@ class Writer {
   void PutAll(const std::vector<T>& values) {
     bytes_.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
   }
+  void PutRaw(std::string_view bytes) { bytes_.append(bytes); }
   void PutText(std::string_view text) {
     Put(static_cast<uint32_t>(text.size()));
-    bytes_.append(text);
+    PutRaw(text);
   }
   template <int kSize>
   void PutVector(const Eigen::Matrix<double, kSize, 1>& vector) {
     for (int i = 0; i < kSize; ++i) Put(vector[i]);
   }
+  // Over what was put there before.
+  void Replace(size_t at, std::string_view bytes) { bytes_.replace(at, bytes.size(), bytes); }
   const std::string& bytes() const { return bytes_; }
+  std::string TakeBytes() { return std::move(bytes_); }
 
  private:
   std::string bytes_;
@@ -296,20 +303,35 @@ uint32_t Checksum(std::string_view bytes) {
       crc32_z(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
-}  // namespace
-
-std::string WithMapHeader(std::string_view payload) {
+std::string Header(std::string_view payload) {
   Writer header;
   header.Put(kMapFileVersion);
   header.Put(Checksum(payload));
   header.Put(static_cast<uint64_t>(payload.size()));
-  std::string bytes;
-  bytes.reserve(kHeaderBytes + payload.size());
-  return bytes.append(kMagic).append(header.bytes()).append(payload);
+  return std::string(kMagic) + header.bytes();
 }
 
+// Enough for the file of a map. It is large, so that a buffer that grows would need several times as much.
+size_t RoomFor(const Map& map) {
+  constexpr size_t kCameraBytes = kMaxName + 256;
+  size_t bytes = kHeaderBytes + kCameraBytes + map.octave_scales().size() * sizeof(float);
+  map.keyframes().ForEach([&bytes](const Keyframe& keyframe) {
+    bytes += kKeyframeBytes + keyframe.features().size() * (sizeof(Keypoint) + sizeof(Descriptor)) +
+             keyframe.static_probability().size() * sizeof(float);
+  });
+  map.landmarks().ForEach([&bytes](const Landmark& landmark) {
+    bytes += kLandmarkBytes + landmark.observations().size() * kObservationBytes;
+  });
+  return bytes;
+}
+
+}  // namespace
+
+std::string WithMapHeader(std::string_view payload) { return Header(payload).append(payload); }
+
 std::string EncodeMap(const Camera& camera, const Map& map) {
-  Writer out;
+  Writer out(RoomFor(map));
+  out.PutRaw(std::string(kHeaderBytes, '\0'));
   PutCamera(camera, &out);
   out.Put(static_cast<uint32_t>(map.octave_scales().size()));
   out.PutAll(map.octave_scales());
@@ -331,7 +353,8 @@ std::string EncodeMap(const Camera& camera, const Map& map) {
   for_each_at_rest([&landmarks](const Landmark&) { ++landmarks; });
   out.Put(landmarks);
   for_each_at_rest([&](const Landmark& landmark) { PutLandmark(landmark, keyframe_index, &out); });
-  return WithMapHeader(out.bytes());
+  out.Replace(0, Header(std::string_view(out.bytes()).substr(kHeaderBytes)));
+  return out.TakeBytes();
 }
 
 SavedMap DecodeMap(std::string_view bytes, const std::string& name) {
