@@ -284,8 +284,8 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
   control.on_frame = [&](const RunProgress& progress) {
     console.Show(progress);
     const Frame& frame = *progress.frame_in_work;
-    if (!journal.Add(*progress.record, progress.map->Read()->PartOf(frame.reference),
-                     frame.cam_from_world.Inverse())) {
+    if (!journal.Add(*progress.record, progress.result->tracking.reason,
+                     progress.map->Read()->PartOf(frame.reference), frame.cam_from_world.Inverse())) {
       console.Say("warning: there is no more space for the journal: a run that is killed now loses the rest");
     }
     checkpoint.SaveIfDue(system);

@@ -149,16 +149,18 @@ Json EventsOf(const Run& run) {
     events.push_back({Rounded(run.Since(timestamp_s), 3), kind, text});
   };
   TrackingState last = TrackingState::kInitialising;
-  for (const RunSummary::FrameRecord& frame : run.summary.frames) {
+  for (size_t i = 0; i < run.summary.frames.size(); ++i) {
+    const RunSummary::FrameRecord& frame = run.summary.frames[i];
+    const std::string reason(run.summary.ReasonOf(i));
     const double stamp_s = frame.timestamp_s;
     if (frame.state != last) {
       if (frame.state == TrackingState::kTracking) {
         add(stamp_s, "start", last == TrackingState::kLost ? "found again" : "started");
       } else if (last == TrackingState::kTracking) {
-        add(stamp_s, "lost", std::string(frame.Reason()));
+        add(stamp_s, "lost", reason);
       }
     }
-    if (frame.map_was_erased) add(stamp_s, "reset", std::string(frame.Reason()));
+    if (frame.map_was_erased) add(stamp_s, "reset", reason);
     if (frame.keyframe_reason != KeyframeReason::kNone) {
       add(stamp_s, "keyframe", fmt::format("keyframe: {}", Name(frame.keyframe_reason)));
     }

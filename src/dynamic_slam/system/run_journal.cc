@@ -46,7 +46,8 @@ RunJournal::RunJournal(std::filesystem::path folder)
   if (!stream_) throw InputError(file_.string(), "cannot be written", "Choose another folder with --out.");
 }
 
-bool RunJournal::Add(const RunSummary::FrameRecord& record, PartId part, const Rigid3& world_from_cam) {
+bool RunJournal::Add(const RunSummary::FrameRecord& record, std::string_view reason, PartId part,
+                     const Rigid3& world_from_cam) {
   if (!stream_) return true;
   stream_ << (record.map_was_erased ? "1," : "0,");
   if (record.state == TrackingState::kTracking && part.IsValid()) {
@@ -58,7 +59,7 @@ bool RunJournal::Add(const RunSummary::FrameRecord& record, PartId part, const R
     stream_ << ",,,,,,,,";
   }
   // To the system, where it is safe from all but a loss of power.
-  stream_ << FramesCsvRow(record) << std::flush;
+  stream_ << FramesCsvRow(record, reason) << std::flush;
   return static_cast<bool>(stream_);
 }
 

@@ -23,9 +23,8 @@ class RunJournalTest : public testing::Test {
     RunSummary::FrameRecord record;
     record.timestamp_s = 0.1 * i;
     record.state = part < 0 ? TrackingState::kLost : TrackingState::kTracking;
-    if (part < 0) record.reason = std::make_shared<const std::string>("12 inliers, 35 needed");
     record.map_was_erased = map_was_erased;
-    journal->Add(record, PartId(static_cast<uint32_t>(std::max(part, 0))), PoseAt(i));
+    journal->Add(record, part < 0 ? "12 inliers, 35 needed" : "", PartId(static_cast<uint32_t>(std::max(part, 0))), PoseAt(i));
   }
 
   std::filesystem::path folder_ =

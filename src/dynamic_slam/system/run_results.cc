@@ -136,11 +136,11 @@ std::string FramesCsvHeader() {
          "tracking_ms,reason\n";
 }
 
-std::string FramesCsvRow(const RunSummary::FrameRecord& frame) {
+std::string FramesCsvRow(const RunSummary::FrameRecord& frame, std::string_view reason) {
   return fmt::format("{:.9f},{},{},{},{},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s,
                      Name(frame.state), frame.keypoints, frame.inliers, Name(frame.keyframe_reason),
                      Name(frame.detection), frame.objects, frame.outside, frame.kept + frame.culled, frame.culled,
-                     frame.kept, frame.tracking_ms, frame.Reason());
+                     frame.kept, frame.tracking_ms, reason);
 }
 
 void WriteTrajectories(const std::filesystem::path& folder, std::span<const Trajectory> trajectories) {
@@ -206,7 +206,9 @@ void WriteResults(const std::filesystem::path& folder, const SlamSystem& system,
     WriteKittiPoses(kitti, poses);
   }
   std::string frames = FramesCsvHeader();
-  for (const RunSummary::FrameRecord& frame : summary.frames) frames += FramesCsvRow(frame);
+  for (size_t i = 0; i < summary.frames.size(); ++i) {
+    frames += FramesCsvRow(summary.frames[i], summary.ReasonOf(i));
+  }
   WriteFileAtomically(folder / "frames.csv", frames);
   WriteFileAtomically(folder / "loops.csv", LoopsCsv(summary.loops.attempts));
   WritePly(folder / "map.ply", LandmarksOfMainPart(system, factor));

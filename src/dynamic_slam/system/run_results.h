@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <exception>
 #include <filesystem>
 #include <limits>
-#include <memory>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "dynamic_slam/base/file_backed_vector.h"
 #include "dynamic_slam/geometry/metric_scale.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/slam_system.h"
@@ -64,7 +64,6 @@ struct RunSummary {
     using Count = uint16_t;
 
     double timestamp_s = 0;
-    std::shared_ptr<const std::string> reason;      // why there is no pose, for the frames that have none
     uint32_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
     float tracking_ms = 0;
     Count keypoints = 0, inliers = 0;
@@ -78,9 +77,13 @@ struct RunSummary {
     static Count Counted(int64_t number) {
       return static_cast<Count>(std::clamp<int64_t>(number, 0, std::numeric_limits<Count>::max()));
     }
-    std::string_view Reason() const { return reason == nullptr ? std::string_view() : *reason; }
   };
-  std::deque<FrameRecord> frames;
+  FileBackedVector<FrameRecord> frames;
+  std::map<size_t, std::string> reasons;  // why a frame has no pose, by its place in `frames`
+  std::string_view ReasonOf(size_t frame) const {
+    const auto reason = reasons.find(frame);
+    return reason == reasons.end() ? std::string_view() : reason->second;
+  }
   double Coverage() const {  // live
     return frames_total == 0 ? 0 : static_cast<double>(frames_tracked) / static_cast<double>(frames_total);
   }
@@ -101,7 +104,7 @@ void WriteTrajectories(const std::filesystem::path& folder, std::span<const Traj
 
 // frames.csv, line by line.
 std::string FramesCsvHeader();
-std::string FramesCsvRow(const RunSummary::FrameRecord& frame);
+std::string FramesCsvRow(const RunSummary::FrameRecord& frame, std::string_view reason);
 
 // Makes the folder and checks that files can be written there, so that a long run does not end in an error.
 void PrepareOutputFolder(const std::filesystem::path& folder);

@@ -57,11 +57,9 @@ class FrameLog {
     was_tracking_ = is_tracking;
     summary_->most_keyframes_waiting = std::max(summary_->most_keyframes_waiting, result.keyframes_waiting);
     const auto [map_keyframes, map_landmarks] = SizesOf(map);
+    if (!tracking.reason.empty()) summary_->reasons[summary_->frames.size()] = tracking.reason;
     using Record = RunSummary::FrameRecord;
     summary_->frames.push_back({.timestamp_s = timestamp_s,
-                                .reason = tracking.reason.empty()
-                                              ? nullptr
-                                              : std::make_shared<const std::string>(tracking.reason),
                                 .map_keyframes = map_keyframes,
                                 .map_landmarks = map_landmarks,
                                 .tracking_ms = static_cast<float>(result.tracking_ms),

@@ -156,15 +156,20 @@ void SlamSystem::Remember(const FrameResult& result) {
     const auto is_gone = [&](const TrackedFrame& tracked) {
       return !map->PartOf(tracked.Reference()).IsValid();
     };
-    std::erase_if(tracked_, is_gone);
+    std::vector<TrackedFrame> left(tracked_.begin(), tracked_.end());
+    std::erase_if(left, is_gone);
+    tracked_.Assign(left);
     if (backfiller_.has_value()) backfiller_->PartWasErased();
   }
   const bool has_pose = tracking.state == TrackingState::kTracking;
   if (has_pose) {
     if (options_.backfill) {
-      for (const AnchoredPose& earlier : tracking.earlier_frames) tracked_.emplace_back(earlier, false);
+      for (const AnchoredPose& earlier : tracking.earlier_frames) {
+        tracked_.push_back(TrackedFrame(earlier, false));
+      }
     }
-    tracked_.emplace_back(AnchoredPose{frame.timestamp_s, frame.reference, frame.cam_from_reference}, true);
+    const AnchoredPose pose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
+    tracked_.push_back(TrackedFrame(pose, true));
   }
   if (!backfiller_.has_value()) return;
   if (!has_pose || tracking.may_be_erased) {
@@ -237,12 +242,14 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
 }
 
 void SlamSystem::Backfill(const std::function<bool()>& should_stop) {
+  std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
   std::vector<AnchoredPose> known;
-  for (const TrackedFrame& frame : tracked_) known.push_back(frame.Pose());
-  for (const AnchoredPose& pose : backfiller_->Find(known, should_stop)) tracked_.emplace_back(pose, false);
-  std::stable_sort(tracked_.begin(), tracked_.end(), [](const TrackedFrame& a, const TrackedFrame& b) {
+  for (const TrackedFrame& frame : all) known.push_back(frame.Pose());
+  for (const AnchoredPose& pose : backfiller_->Find(known, should_stop)) all.emplace_back(pose, false);
+  std::stable_sort(all.begin(), all.end(), [](const TrackedFrame& a, const TrackedFrame& b) {
     return a.timestamp_s < b.timestamp_s;
   });
+  tracked_.Assign(all);
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {

@@ -12,6 +12,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "dynamic_slam/base/file_backed_vector.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
@@ -170,7 +171,7 @@ class SlamSystem {
   Guarded<LoopReport> loop_report_;
   Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
-  std::deque<TrackedFrame> tracked_;      // in the order of time
+  FileBackedVector<TrackedFrame> tracked_;  // in the order of time
   std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work
