@@ -11,6 +11,10 @@
 #include <utility>
 #include <vector>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 #include <opencv2/core.hpp>
@@ -118,7 +122,17 @@ int Main(int argc, char** argv) {
 
 }  // namespace
 
+// What is as large as a saved map goes back to the system and leaves no hole, which small things would settle in
+// before the next save. The rest is kept, as each frame needs it again.
+void SetUpMemory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 8 << 20);
+  mallopt(M_TRIM_THRESHOLD, 64 << 20);
+#endif
+}
+
 int main(int argc, char** argv) {
+  SetUpMemory();
   // Who reads what is printed may go away; results are for files.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk

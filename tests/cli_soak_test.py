@@ -16,7 +16,7 @@ import unittest
 PROGRAM = ""
 FRAMES, FPS = 18000, 10
 KNOWN_AFTER_ROUNDS = 6
-MOST_MB_PER_10_MINUTES = 2  # 0.6 of it are poses and results of frames, 0.4 the map
+MOST_MB_PER_10_MINUTES = 1
 CAMERA = "model: pinhole\nwidth: 320\nheight: 240\nfps: 10\nfx: 260\nfy: 260\ncx: 159.5\ncy: 119.5\n"
 
 
