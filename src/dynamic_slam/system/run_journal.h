@@ -24,8 +24,8 @@ class RunJournal {
   // Where an older journal went; empty where there was none.
   const std::filesystem::path& kept() const { return kept_; }
 
-  // reason: why the frame has no pose. part, world_from_cam: of one that has. A disk that is full ends the journal, not the run:
-  // false, once.
+  // reason: RunSummary::ReasonOf the frame. part, world_from_cam: of one that has. A disk that is full ends
+  // the journal, not the run: false, once.
   bool Add(const RunSummary::FrameRecord& record, std::string_view reason, PartId part,
            const Rigid3& world_from_cam);
 

@@ -79,7 +79,8 @@ struct RunSummary {
     }
   };
   FileBackedVector<FrameRecord> frames;
-  std::map<size_t, std::string> reasons;  // why a frame has no pose, by its place in `frames`
+  // Why a frame has no pose, or how it came to have one again, by its place in `frames`; most have none.
+  std::map<size_t, std::string> reasons;
   std::string_view ReasonOf(size_t frame) const {
     const auto reason = reasons.find(frame);
     return reason == reasons.end() ? std::string_view() : reason->second;
