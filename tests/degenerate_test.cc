@@ -128,9 +128,9 @@ class DegenerateTest : public FolderTest {
   void ExpectSound(const WholeRun& run, size_t frames) {
     ASSERT_EQ(run.summary.failure, nullptr) << FailureMessage(run.summary);
     ASSERT_EQ(run.summary.frames.size(), frames);
-    for (const auto& frame : run.summary.frames) {
-      if (frame.state != TrackingState::kTracking) {
-        EXPECT_THAT(frame.reason, Not(IsEmpty())) << frame.timestamp_s;
+    for (size_t i = 0; i < frames; ++i) {
+      if (run.summary.frames[i].state != TrackingState::kTracking) {
+        EXPECT_THAT(run.summary.ReasonOf(i), Not(IsEmpty())) << i;
       }
     }
     for (const PartId part : run.system->Parts()) {
