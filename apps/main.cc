@@ -120,8 +120,6 @@ int Main(int argc, char** argv) {
   }
 }
 
-}  // namespace
-
 // What is as large as a saved map goes back to the system and leaves no hole, which small things would settle in
 // before the next save. The rest is kept, as each frame needs it again.
 void SetUpMemory() {
@@ -130,6 +128,8 @@ void SetUpMemory() {
   mallopt(M_TRIM_THRESHOLD, 64 << 20);
 #endif
 }
+
+}  // namespace
 
 int main(int argc, char** argv) {
   SetUpMemory();

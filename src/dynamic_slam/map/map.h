@@ -1,6 +1,5 @@
 #pragma once
 
-#include <deque>
 #include <string>
 #include <vector>
 
@@ -133,7 +132,7 @@ class Map {
   PlaceIndex places_;
   std::vector<KeyframeId> origins_{KeyframeId()};  // by part
   MergeLog merges_;
-  std::deque<Anchor> heirs_;  // by keyframe id; not valid while the keyframe lives
+  std::vector<Anchor> heirs_;  // by keyframe id; not valid while the keyframe lives
 };
 
 }  // namespace dynamic_slam

@@ -151,16 +151,15 @@ Json EventsOf(const Run& run) {
   TrackingState last = TrackingState::kInitialising;
   for (size_t i = 0; i < run.summary.frames.size(); ++i) {
     const RunSummary::FrameRecord& frame = run.summary.frames[i];
-    const std::string reason(run.summary.ReasonOf(i));
     const double stamp_s = frame.timestamp_s;
     if (frame.state != last) {
       if (frame.state == TrackingState::kTracking) {
         add(stamp_s, "start", last == TrackingState::kLost ? "found again" : "started");
       } else if (last == TrackingState::kTracking) {
-        add(stamp_s, "lost", reason);
+        add(stamp_s, "lost", std::string(run.summary.ReasonOf(i)));
       }
     }
-    if (frame.map_was_erased) add(stamp_s, "reset", reason);
+    if (frame.map_was_erased) add(stamp_s, "reset", std::string(run.summary.ReasonOf(i)));
     if (frame.keyframe_reason != KeyframeReason::kNone) {
       add(stamp_s, "keyframe", fmt::format("keyframe: {}", Name(frame.keyframe_reason)));
     }
@@ -248,9 +247,9 @@ Json KeypointsSection(const Run& run) {
   using Frame = RunSummary::FrameRecord;
   const FrameCharts charts(run);
   const Json stack = {
-      charts.Series("static", "c3", [](const Frame& f) { return f.outside; }),
-      charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.kept; }),
-      charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.culled; })};
+      charts.Series("static", "c3", [](const Frame& f) { return f.dynamic.outside; }),
+      charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.dynamic.kept; }),
+      charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.dynamic.culled; })};
   const Json inliers = {
       charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })};
   return ChartsSection(

@@ -97,7 +97,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   return json;
 }
 
-std::string LoopsCsv(const std::deque<LoopAttempt>& attempts) {
+std::string LoopsCsv(const std::vector<LoopAttempt>& attempts) {
   std::string csv =
       "timestamp,keyframe,candidate,candidate_timestamp,score,matches,sim3_inliers,visible,inliers,"
       "confirming,"
@@ -139,8 +139,8 @@ std::string FramesCsvHeader() {
 std::string FramesCsvRow(const RunSummary::FrameRecord& frame, std::string_view reason) {
   return fmt::format("{:.9f},{},{},{},{},{},{},{},{},{},{},{:.3f},\"{}\"\n", frame.timestamp_s,
                      Name(frame.state), frame.keypoints, frame.inliers, Name(frame.keyframe_reason),
-                     Name(frame.detection), frame.objects, frame.outside, frame.kept + frame.culled, frame.culled,
-                     frame.kept, frame.tracking_ms, reason);
+                     Name(frame.detection), frame.objects, frame.dynamic.outside, frame.dynamic.InBoxes(),
+                     frame.dynamic.culled, frame.dynamic.kept, frame.tracking_ms, reason);
 }
 
 void WriteTrajectories(const std::filesystem::path& folder, std::span<const Trajectory> trajectories) {

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -58,25 +56,18 @@ struct RunSummary {
   std::string last_reason;             // what tracking said last, while it had no pose
   std::vector<SourceProblem> skipped;  // images that could not be used
 
-  // One line of frames.csv. Small, as a run may last for hours; a count that does not fit is the greatest that
-  // does.
+  // One line of frames.csv, but for the reason.
   struct FrameRecord {
-    using Count = uint16_t;
-
     double timestamp_s = 0;
-    uint32_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
     float tracking_ms = 0;
-    Count keypoints = 0, inliers = 0;
-    Count outside = 0, kept = 0, culled = 0;  // of the keypoints (DynamicKeypoints)
-    Count objects = 0;                        // seen or believed to be in the frame
+    int32_t keypoints = 0, inliers = 0;
+    DynamicKeypoints dynamic;
+    int32_t objects = 0;                            // seen or believed to be in the frame
+    uint32_t map_keyframes = 0, map_landmarks = 0;  // when the frame was done
     TrackingState state = TrackingState::kInitialising;
     KeyframeReason keyframe_reason = KeyframeReason::kNone;
     DetectionState detection = DetectionState::kOff;
     bool map_was_erased = false;  // the part of the map that the camera was in
-
-    static Count Counted(int64_t number) {
-      return static_cast<Count>(std::clamp<int64_t>(number, 0, std::numeric_limits<Count>::max()));
-    }
   };
   FileBackedVector<FrameRecord> frames;
   // Why a frame has no pose, or how it came to have one again, by its place in `frames`; most have none.

@@ -137,7 +137,7 @@ void SlamSystem::ThrowIfFailed() const {
 }
 
 SlamSystem::TrackedFrame::TrackedFrame(const AnchoredPose& pose, bool is_live_in)
-    : timestamp_s(pose.timestamp_s), reference(pose.reference.value()), is_live(is_live_in) {
+    : timestamp_s(pose.timestamp_s), reference(pose.reference), is_live(is_live_in) {
   Eigen::Map<Eigen::Vector4f>(rotation_xyzw.data()) = pose.cam_from_reference.rotation.coeffs().cast<float>();
   Eigen::Map<Eigen::Vector3f>(translation.data()) = pose.cam_from_reference.translation.cast<float>();
 }
@@ -145,7 +145,7 @@ SlamSystem::TrackedFrame::TrackedFrame(const AnchoredPose& pose, bool is_live_in
 AnchoredPose SlamSystem::TrackedFrame::Pose() const {
   const Eigen::Map<const Eigen::Quaternionf> rotation(rotation_xyzw.data());
   const Eigen::Map<const Eigen::Vector3f> cam_from_reference(translation.data());
-  return {timestamp_s, Reference(), Rigid3(rotation.cast<double>(), cam_from_reference.cast<double>())};
+  return {timestamp_s, reference, Rigid3(rotation.cast<double>(), cam_from_reference.cast<double>())};
 }
 
 void SlamSystem::Remember(const FrameResult& result) {
@@ -154,7 +154,7 @@ void SlamSystem::Remember(const FrameResult& result) {
   if (tracking.part_was_erased) {
     const auto map = map_.Read();
     const auto is_gone = [&](const TrackedFrame& tracked) {
-      return !map->PartOf(tracked.Reference()).IsValid();
+      return !map->PartOf(tracked.reference).IsValid();
     };
     std::vector<TrackedFrame> left(tracked_.begin(), tracked_.end());
     std::erase_if(left, is_gone);
@@ -319,7 +319,7 @@ std::vector<PartId> SlamSystem::Parts() const {
   const auto map = map_.Read();
   std::vector<PartId> parts = map->Parts();
   std::map<PartId, size_t> frames;
-  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.Reference())];
+  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.reference)];
   std::erase_if(parts, [&](PartId part) { return frames[part] == 0; });
   std::stable_sort(parts.begin(), parts.end(), [&](PartId a, PartId b) { return frames[a] > frames[b]; });
   return parts;
@@ -337,7 +337,7 @@ Trajectory SlamSystem::FrameTrajectory(PartId part) const {
   trajectory.reserve(tracked_.size());
   const auto map = map_.Read();
   for (const TrackedFrame& frame : tracked_) {
-    if (map->PartOf(frame.Reference()) != part) continue;
+    if (map->PartOf(frame.reference) != part) continue;
     const AnchoredPose pose = frame.Pose();
     trajectory.push_back(
         {pose.timestamp_s, map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse()});
@@ -349,7 +349,7 @@ size_t SlamSystem::LiveFrameCount() const {
   const PartId part = OrMain({});
   const auto map = map_.Read();
   return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(), [&](const TrackedFrame& frame) {
-    return frame.is_live && map->PartOf(frame.Reference()) == part;
+    return frame.is_live && map->PartOf(frame.reference) == part;
   }));
 }
 

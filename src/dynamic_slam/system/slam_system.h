@@ -3,7 +3,6 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -49,7 +48,7 @@ struct MappingReport {
 
 // What the search for loops has found so far.
 struct LoopReport {
-  std::deque<LoopAttempt> attempts;  // of all keyframes, in their order; a reason says why one was refused
+  std::vector<LoopAttempt> attempts;  // of all keyframes, in their order; a reason says why one was refused
   int linked = 0;                     // places known again where nothing had to be moved
   int corrected = 0;                  // loops after which the map was moved
   int joined = 0;                     // of these, those that made one of two parts of the map
@@ -133,14 +132,13 @@ class SlamSystem {
   // An AnchoredPose in half the room, since there is one for each frame: float has it to 1e-7 of its length.
   struct TrackedFrame {
     double timestamp_s = 0;
-    uint32_t reference : 31;  // KeyframeId; the first 2^31 of them are enough
-    uint32_t is_live : 1;     // not given its pose by a later frame
+    KeyframeId reference;
+    bool is_live = false;  // not given its pose by a later frame
     std::array<float, 4> rotation_xyzw{};
     std::array<float, 3> translation{};
 
     TrackedFrame(const AnchoredPose& pose, bool is_live_in);
     AnchoredPose Pose() const;
-    KeyframeId Reference() const { return KeyframeId(reference); }
   };
 
   struct MappedKeyframe {

@@ -194,7 +194,7 @@ void LiveView::NoteEvents(const RunProgress& progress, const SlamSystem& system)
   if (const auto detection = system.detection_report(); detection.has_value()) {
     detector_ms_ = LastOf(detection->times_ms);
   }
-  const std::deque<LoopAttempt> attempts = system.loop_report().attempts;
+  const std::vector<LoopAttempt> attempts = system.loop_report().attempts;
   for (; attempts_told_ < attempts.size(); ++attempts_told_) {
     const LoopAttempt& attempt = attempts[attempts_told_];
     if (!attempt.reason.empty()) continue;
