@@ -1,5 +1,6 @@
 #include "dynamic_slam/optimize/pose_optimizer.h"
 
+#include <cmath>
 #include <limits>
 
 #include <Eigen/LU>
@@ -264,6 +265,34 @@ TEST(PoseOptimizer, ReuseOfObjectsChangesNothing) {
   EXPECT_EQ(estimate.cam_from_world.translation, fresh.cam_from_world.translation);
   EXPECT_EQ(estimate.is_inlier, fresh.is_inlier);
   EXPECT_EQ(estimate.information, fresh.information);
+}
+
+TEST(RightInliers, AreCountedAmongMatchesByChance) {
+  Random random(5);
+  PoseOptimizerOptions options;
+  for (const int right : {0, 2000, 5000, 10000}) {
+    PoseEstimate estimate;
+    double sum = 0;
+    while (estimate.inliers < 10000) {
+      const double u = random.Gaussian(), v = random.Gaussian();
+      const double e2 = estimate.inliers < right ? u * u + v * v : random.Uniform(0, options.chi2);
+      if (e2 > options.chi2) continue;
+      sum += e2;
+      ++estimate.inliers;
+    }
+    estimate.rms_px = std::sqrt(sum / estimate.inliers);
+    EXPECT_NEAR(RightInliers(estimate, options.chi2), right, 400) << right;
+  }
+}
+
+TEST(RightInliers, AreAllWhenTheyAreNearerThanTheirSigmasAndNoneWhenThereIsNone) {
+  PoseEstimate estimate;
+  EXPECT_EQ(RightInliers(estimate, 5.991), 0);
+  estimate.inliers = 50;
+  estimate.rms_px = 0.5;
+  EXPECT_EQ(RightInliers(estimate, 5.991), 50);
+  estimate.rms_px = std::sqrt(5.991);
+  EXPECT_EQ(RightInliers(estimate, 5.991), 0);
 }
 
 }  // namespace

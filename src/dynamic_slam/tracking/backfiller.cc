@@ -140,7 +140,8 @@ std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* 
   shutter_.Begin(&frame);
   const auto is_plausible = [&] {
     localiser_.Anchor(&frame);
-    return IsPlausible(known, {frame.timestamp_s, frame.reference, frame.cam_from_reference});
+    return localiser_.pose_tracker().RightInliers() >= kept->min_inliers &&
+           IsPlausible(known, {frame.timestamp_s, frame.reference, frame.cam_from_reference});
   };
   const auto fits = [&](const Guess& guess, double search) {
     CorrectShutterAt(known, guess, &frame);

@@ -19,7 +19,8 @@ namespace dynamic_slam {
 
 // Gives frames that had no pose when their turn came one in the finished map, which knows more: from where
 // the frames before and after them are, or else from what they look like. A pose needs as many inliers as it
-// did then, and must be one to which the camera can have moved from those before and after it.
+// did then, so near that they are no chance, and must be one to which the camera can have moved from those
+// before and after it.
 class Backfiller {
  public:
   Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);

@@ -1,5 +1,7 @@
 #include "dynamic_slam/tracking/backfiller.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,6 +72,26 @@ TEST_F(BackfillerTest, FarFromAnyPoseAFrameIsFoundByWhatItLooksLike) {
   const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_LT((CentreOf(found[0]) - Eigen::Vector3d(0.5, 0, 0)).norm(), 0.02);
+}
+
+TEST_F(BackfillerTest, MatchesThatLieAnywhereWithinTheLimitAreNoPose) {
+  const double limit_px = std::sqrt(TrackerOptions().pose.chi2);
+  for (const double share : {0.0, 1.0}) {
+    Frame frame = FrameAt(0.5 + 0.05 * share);
+    Random random(1);
+    for (Keypoint& keypoint : frame.features.keypoints) {
+      const double scale = world_.OctaveScales()[static_cast<size_t>(keypoint.octave)];
+      const double r_px = share * scale * limit_px * std::sqrt(random.Uniform(0, 1));
+      const double angle_rad = random.Uniform(-M_PI, M_PI);
+      keypoint.x += static_cast<float>(r_px * std::cos(angle_rad));
+      keypoint.y += static_cast<float>(r_px * std::sin(angle_rad));
+    }
+    frame.grid.Build(frame.features, world_.camera().IdealBounds());
+    backfiller_.Keep(frame, 3 * kMinInliers, false);  // a few always seem to fit
+  }
+  const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].timestamp_s, 0.5);
 }
 
 TEST_F(BackfillerTest, NobodyIsFasterThanTheCameraEverWas) {

@@ -34,6 +34,9 @@ class PoseTracker {
   // call.
   int TrackLocalMap(const LocalView& view, double radius_px, Frame* frame, std::vector<uint8_t>* in_view);
 
+  // How many of the inliers of the last pose can be right (see RightInliers of an estimate).
+  double RightInliers() const { return dynamic_slam::RightInliers(estimate_, options_.pose.chi2); }
+
   // Landmarks that were matched and did not fit the last pose that was found.
   const std::vector<LandmarkId>& rejected() const { return rejected_; }
 
