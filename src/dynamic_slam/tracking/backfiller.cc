@@ -15,6 +15,9 @@ constexpr size_t kMaxKeypoints = 2'000'000;
 // From poses more frames away nobody knows where the camera is.
 constexpr double kMaxGapFrames = 4;
 
+// Frames in a row are no farther apart, in intervals.
+constexpr double kNextFrame = 1.5;
+
 // A camera that is so many times as fast as it nearly always was between two frames is a wrong pose: a few
 // landmarks found by chance, or on somebody who moves. With fewer steps known nobody can tell.
 constexpr double kMaxSpeedRatio = 2, kNearlyAlways = 0.95;
@@ -85,21 +88,54 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
   for (const AnchoredPose& pose : known) poses.emplace(pose.timestamp_s, pose);
   LearnMotion(poses);
   std::vector<AnchoredPose> found;
+  if (Spread(should_stop, &poses, &found) && Recognise(should_stop, &poses, &found))
+    Spread(should_stop, &poses, &found);
+  return found;
+}
+
+bool Backfiller::Spread(const std::function<bool()>& should_stop, Known* known,
+                        std::vector<AnchoredPose>* found) {
   // To and fro, as each pose found is a neighbour to the next.
   for (bool is_forward = true, goes_on = true; goes_on || !is_forward; is_forward = !is_forward) {
     if (is_forward) goes_on = false;
     for (size_t i = 0; i < kept_.size(); ++i) {
       KeptFrame& kept = kept_[is_forward ? i : kept_.size() - 1 - i];
-      if (poses.contains(kept.timestamp_s)) continue;
-      if (should_stop && should_stop()) return found;
-      const std::optional<AnchoredPose> pose = FindPose(poses, &kept);
+      if (known->contains(kept.timestamp_s)) continue;
+      if (should_stop && should_stop()) return false;
+      const std::optional<AnchoredPose> pose = FindFromNeighbours(*known, &kept);
       if (!pose.has_value()) continue;
-      poses.emplace(pose->timestamp_s, *pose);
-      found.push_back(*pose);
+      known->emplace(pose->timestamp_s, *pose);
+      found->push_back(*pose);
       goes_on = true;
     }
   }
-  return found;
+  return true;
+}
+
+bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* known,
+                           std::vector<AnchoredPose>* found) {
+  Known with_recognised = *known;
+  for (const KeptFrame& kept : kept_) {
+    if (known->contains(kept.timestamp_s)) continue;
+    if (should_stop && should_stop()) return false;
+    Frame frame = FrameOf(kept);
+    if (!localiser_.Relocalise(kept.min_inliers, random_, &frame).has_value()) continue;
+    const std::optional<AnchoredPose> pose = PlausiblePose(*known, kept, &frame);
+    if (pose.has_value()) with_recognised.emplace(pose->timestamp_s, *pose);
+  }
+  for (auto pose = with_recognised.begin(); pose != with_recognised.end(); ++pose) {
+    if (known->contains(pose->first)) continue;
+    const auto agrees = [&](const AnchoredPose& other) {
+      return std::abs(other.timestamp_s - pose->first) <= kNextFrame * interval_s_ &&
+             AreInOnePart(other, pose->second) && IsReachable(other, pose->second);
+    };
+    if ((pose != with_recognised.begin() && agrees(std::prev(pose)->second)) ||
+        (std::next(pose) != with_recognised.end() && agrees(std::next(pose)->second))) {
+      found->push_back(pose->second);
+    }
+  }
+  for (const AnchoredPose& pose : *found) known->emplace(pose.timestamp_s, pose);
+  return true;
 }
 
 void Backfiller::CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const {
@@ -122,47 +158,49 @@ void Backfiller::CorrectShutterAt(const Known& known, const Guess& guess, Frame*
   shutter_.Move(motion, depth > 0 ? 1 / depth : 0, frame);
 }
 
-std::optional<AnchoredPose> Backfiller::FindPose(const Known& known, KeptFrame* kept) {
+Frame Backfiller::FrameOf(const KeptFrame& kept) {
+  Frame frame;
+  frame.id = kept.id;
+  frame.timestamp_s = kept.timestamp_s;
+  frame.features = kept.features;
+  frame.static_probability = kept.static_probability;
+  frame.ClearLandmarks();
+  shutter_.Begin(&frame);
+  return frame;
+}
+
+std::optional<AnchoredPose> Backfiller::PlausiblePose(const Known& known, const KeptFrame& kept,
+                                                      Frame* frame) {
+  if (localiser_.pose_tracker().RightInliers() < kept.min_inliers) return std::nullopt;
+  localiser_.Anchor(frame);
+  const AnchoredPose pose{frame->timestamp_s, frame->reference, frame->cam_from_reference};
+  return IsPlausible(known, pose) ? std::optional(pose) : std::nullopt;
+}
+
+std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const Known& known, KeptFrame* kept) {
   const auto next = known.upper_bound(kept->timestamp_s);
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const std::pair between(next == known.begin() ? -kNone : std::prev(next)->first,
                           next == known.end() ? kNone : next->first);
   if (kept->tried_between == between) return std::nullopt;
-  const bool is_first_try = !kept->tried_between.has_value();
   kept->tried_between = between;
 
-  Frame frame;
-  frame.id = kept->id;
-  frame.timestamp_s = kept->timestamp_s;
-  frame.features = kept->features;
-  frame.static_probability = kept->static_probability;
-  frame.ClearLandmarks();
-  shutter_.Begin(&frame);
-  const auto is_plausible = [&] {
-    localiser_.Anchor(&frame);
-    return localiser_.pose_tracker().RightInliers() >= kept->min_inliers &&
-           IsPlausible(known, {frame.timestamp_s, frame.reference, frame.cam_from_reference});
-  };
-  const auto fits = [&](const Guess& guess, double search) {
-    CorrectShutterAt(known, guess, &frame);
-    if (localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
-                             &frame) < options_.min_motion_inliers)
-      return false;
-    CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
-    return localiser_.TrackLocalMap(options_.local_map_radius_px, &frame) >= kept->min_inliers &&
-           is_plausible();
-  };
-  bool is_found = false;
-  for (const Guess& guess : Guesses(known, kept->timestamp_s)) {
-    for (const double search : kSearches) is_found = is_found || fits(guess, search);
-    if (is_found) break;
+  const std::vector<Guess> guesses = Guesses(known, kept->timestamp_s);
+  if (guesses.empty()) return std::nullopt;
+  Frame frame = FrameOf(*kept);
+  for (const Guess& guess : guesses) {
+    for (const double search : kSearches) {
+      CorrectShutterAt(known, guess, &frame);
+      if (localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
+                               &frame) < options_.min_motion_inliers)
+        continue;
+      CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
+      if (localiser_.TrackLocalMap(options_.local_map_radius_px, &frame) < kept->min_inliers) continue;
+      const std::optional<AnchoredPose> pose = PlausiblePose(known, *kept, &frame);
+      if (pose.has_value()) return pose;
+    }
   }
-  // What it looks like does not change with its neighbours.
-  if (!is_found && is_first_try) {
-    is_found = localiser_.Relocalise(kept->min_inliers, random_, &frame).has_value() && is_plausible();
-  }
-  if (!is_found) return std::nullopt;
-  return AnchoredPose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
+  return std::nullopt;
 }
 
 std::vector<Backfiller::Guess> Backfiller::Guesses(const Known& known, double timestamp_s) const {
@@ -209,14 +247,15 @@ void Backfiller::Extrapolate(const AnchoredPose& nearer, const AnchoredPose* far
 }
 
 void Backfiller::LearnMotion(const Known& known) {
-  max_gap_s_ = 0;
+  interval_s_ = max_gap_s_ = 0;
   max_speed_.clear();
   std::vector<double> intervals_s;
   for (auto pose = known.begin(); pose != known.end() && std::next(pose) != known.end(); ++pose) {
     intervals_s.push_back(std::next(pose)->first - pose->first);
   }
   if (intervals_s.empty()) return;
-  max_gap_s_ = kMaxGapFrames * Percentile(0.5, &intervals_s);
+  interval_s_ = Percentile(0.5, &intervals_s);
+  max_gap_s_ = kMaxGapFrames * interval_s_;
   std::map<PartId, std::vector<double>> speeds;
   const auto map = map_->Read();
   for (auto pose = known.begin(); std::next(pose) != known.end(); ++pose) {
@@ -231,19 +270,24 @@ void Backfiller::LearnMotion(const Known& known) {
   }
 }
 
-bool Backfiller::IsPlausible(const Known& known, const AnchoredPose& pose) const {
+bool Backfiller::AreInOnePart(const AnchoredPose& a, const AnchoredPose& b) const {
   const auto map = map_->Read();
-  const PartId part = map->PartOf(pose.reference);
+  return map->PartOf(a.reference) == map->PartOf(b.reference);
+}
+
+bool Backfiller::IsReachable(const AnchoredPose& a, const AnchoredPose& b) const {
+  const auto map = map_->Read();
+  const PartId part = map->PartOf(a.reference);
   const auto limit = max_speed_.find(part);
-  if (limit == max_speed_.end()) return true;
-  const auto is_reachable = [&](const AnchoredPose& other) {
-    return map->PartOf(other.reference) != part ||
-           (CentreOf(other, *map) - CentreOf(pose, *map)).norm() <=
-               limit->second * std::abs(other.timestamp_s - pose.timestamp_s);
-  };
+  return limit == max_speed_.end() || map->PartOf(b.reference) != part ||
+         (CentreOf(a, *map) - CentreOf(b, *map)).norm() <=
+             limit->second * std::abs(a.timestamp_s - b.timestamp_s);
+}
+
+bool Backfiller::IsPlausible(const Known& known, const AnchoredPose& pose) const {
   const auto next = known.upper_bound(pose.timestamp_s);
-  return (next == known.end() || is_reachable(next->second)) &&
-         (next == known.begin() || is_reachable(std::prev(next)->second));
+  return (next == known.end() || IsReachable(next->second, pose)) &&
+         (next == known.begin() || IsReachable(std::prev(next)->second, pose));
 }
 
 }  // namespace dynamic_slam

@@ -18,9 +18,9 @@
 namespace dynamic_slam {
 
 // Gives frames that had no pose when their turn came one in the finished map, which knows more: from where
-// the frames before and after them are, or else from what they look like. A pose needs as many inliers as it
-// did then, so near that they are no chance, and must be one to which the camera can have moved from those
-// before and after it.
+// the frames before and after them are, or else, where two in a row agree, from what they look like. A pose
+// needs as many inliers as it did then, so near that they are no chance, and must be one to which the camera
+// can have moved from those before and after it.
 class Backfiller {
  public:
   Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);
@@ -61,11 +61,23 @@ class Backfiller {
 
   // How fast the camera was, and how often there are frames.
   void LearnMotion(const Known& known);
-  // Whether the camera can have come there from the pose before, and from there to the pose after.
+  bool AreInOnePart(const AnchoredPose& a, const AnchoredPose& b) const;
+  // Whether the camera can have come from one to the other, as far as is known.
+  bool IsReachable(const AnchoredPose& a, const AnchoredPose& b) const;
+  // The same from the pose before, and to the pose after.
   bool IsPlausible(const Known& known, const AnchoredPose& pose) const;
   // A rolling shutter: moves the keypoints by how the camera came here from the nearest pose that is known.
   void CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const;
-  std::optional<AnchoredPose> FindPose(const Known& known, KeptFrame* kept);
+  // These add to known and found; false: they were told to stop. From the poses that are known, from
+  // neighbour to neighbour.
+  bool Spread(const std::function<bool()>& should_stop, Known* known, std::vector<AnchoredPose>* found);
+  // Far from any: by what frames look like, each for itself. A pose that the next frame does not confirm was
+  // found by chance, or on somebody who was there before.
+  bool Recognise(const std::function<bool()>& should_stop, Known* known, std::vector<AnchoredPose>* found);
+  std::optional<AnchoredPose> FindFromNeighbours(const Known& known, KeptFrame* kept);
+  Frame FrameOf(const KeptFrame& kept);
+  // Anchors the frame at the pose that the localiser found; none if that cannot be.
+  std::optional<AnchoredPose> PlausiblePose(const Known& known, const KeptFrame& kept, Frame* frame);
   std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
   // Adds where the camera is at the stamp if it went on as between the two poses, and where it was at the
   // nearer.
@@ -80,7 +92,7 @@ class Backfiller {
   Random random_;
   std::deque<KeptFrame> kept_;  // in the order of time
   size_t keypoints_ = 0;        // of all of them
-  double max_gap_s_ = 0;
+  double interval_s_ = 0, max_gap_s_ = 0;
   std::map<PartId, double> max_speed_;  // map units per s
 };
 

@@ -67,11 +67,23 @@ TEST_F(BackfillerTest, APoseNeedsTheInliersThatItNeededThen) {
   EXPECT_THAT(backfiller_.Find(known_, {}), IsEmpty());
 }
 
-TEST_F(BackfillerTest, FarFromAnyPoseAFrameIsFoundByWhatItLooksLike) {
-  backfiller_.Keep(FrameAt(100, SidewaysPose(0.5)), kMinInliers, false);
+TEST_F(BackfillerTest, FarFromAnyPoseTwoFramesInARowAreFoundByWhatTheyLookLike) {
+  for (const double t : {100.0, 100.05})
+    backfiller_.Keep(FrameAt(t, SidewaysPose(t - 99.5)), kMinInliers, false);
   const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_LT((CentreOf(found[0]) - Eigen::Vector3d(0.5, 0, 0)).norm(), 0.02);
+  ASSERT_EQ(found.size(), 2u);
+  for (const AnchoredPose& pose : found) {
+    EXPECT_LT((CentreOf(pose) - Eigen::Vector3d(pose.timestamp_s - 99.5, 0, 0)).norm(), 0.02);
+  }
+}
+
+TEST_F(BackfillerTest, FarFromAnyPoseWhatNoFrameBesideItConfirmsIsNoPose) {
+  backfiller_.Keep(FrameAt(100, SidewaysPose(0.5)), kMinInliers, false);  // alone
+  backfiller_.Keep(FrameAt(200, SidewaysPose(0.0)), kMinInliers, false);  // 20 units a second
+  backfiller_.Keep(FrameAt(200.05, SidewaysPose(1.0)), kMinInliers, false);
+  backfiller_.Keep(FrameAt(300, SidewaysPose(0.5)), kMinInliers, false);  // a gap between
+  backfiller_.Keep(FrameAt(300.15, SidewaysPose(0.6)), kMinInliers, false);
+  EXPECT_THAT(backfiller_.Find(known_, {}), IsEmpty());
 }
 
 TEST_F(BackfillerTest, MatchesThatLieAnywhereWithinTheLimitAreNoPose) {
