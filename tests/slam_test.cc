@@ -138,9 +138,26 @@ TEST_F(SystemTest, BlackImagesGiveAReason) {
   EXPECT_THAT(ReadFile(folder_ / "trajectory.txt"), testing::MatchesRegex("#[^\n]*\n"));
 }
 
-TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
+TEST_F(SystemTest, AfterImagesThatShowNothingItGoesOn) {
   const Room room = MakeRoom(125);
-  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), BlackFrames(5)), Frames(room, 85, 125)));
+  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), BlackFrames(3)), Frames(room, 83, 125)));
+  const RunSummary& summary = run.summary;
+  EXPECT_EQ(summary.lost_count, 1);
+  for (size_t i = 80; i < 83; ++i) {
+    EXPECT_EQ(summary.frames[i].state, TrackingState::kLost);
+    EXPECT_THAT(summary.ReasonOf(i), HasSubstr("shows nothing"));
+  }
+  for (size_t i = 83; i < 125; ++i) {
+    EXPECT_EQ(summary.frames[i].state, TrackingState::kTracking) << summary.ReasonOf(i);
+    EXPECT_THAT(summary.ReasonOf(i), IsEmpty()) << "it was not looked for";
+  }
+  EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
+            0.005 * PathLength(ToPoseList(room.truth())));
+}
+
+TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
+  const Room room = MakeRoom(125), other = MakeRoom(5, 2);
+  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), Frames(other, 0, 5)), Frames(room, 85, 125)));
   const RunSummary& summary = run.summary;
   ASSERT_TRUE(summary.initialised_at.has_value());
   EXPECT_EQ(summary.lost_count, 1);

@@ -57,7 +57,8 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       random_(seed) {}
 
 void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
-  std::swap(frame_, last_);
+  if (!shows_nothing_) std::swap(frame_, last_);
+  shows_nothing_ = false;
   frame_.id = id;
   frame_.timestamp_s = timestamp_s;
   const bool is_starting = state_ == TrackingState::kInitialising || !start_is_certain_;
@@ -120,7 +121,8 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   result.dynamic = judged;
   result.keypoints = static_cast<int>(frame_.features.size());
   if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
-  if ((last_has_pose_ && TrackFrame()) || Relocalise()) {
+  shows_nothing_ = last_has_pose_ && ShowsNothing();
+  if (!shows_nothing_ && ((last_has_pose_ && TrackFrame()) || Relocalise())) {
     AcceptPose();
     if (!start_is_certain_) ReviewStart(&result);
     if (state_ == TrackingState::kTracking && !result.part_was_erased) {
@@ -130,13 +132,13 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
     Initialise(&result);
   } else {
     state_ = TrackingState::kLost;
-    velocity_.reset();
+    if (!shows_nothing_) velocity_.reset();
     ++lost_frames_;
     StartAnewWhenLostForLong(&result);
   }
   RememberKeyframes(result.new_keyframes);
-  last_has_pose_ = state_ == TrackingState::kTracking;
-  if (start_is_young_ && last_has_pose_) {
+  last_has_pose_ = state_ == TrackingState::kTracking || shows_nothing_;
+  if (start_is_young_ && state_ == TrackingState::kTracking) {
     const PartId part = PartOfFrame();
     start_is_young_ =
         part == start_part_ && (!start_is_certain_ || KeyframesIn(part) <= options_.small_map_keyframes);
@@ -267,7 +269,7 @@ void Tracker::ForgetPose() {
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
   start_is_young_ = false;
-  last_has_pose_ = false;
+  last_has_pose_ = shows_nothing_ = false;
   velocity_.reset();
   lost_frames_ = 0;
   inliers_ = 0;
@@ -325,7 +327,15 @@ std::optional<Eigen::Quaterniond> Tracker::PredictedRotation() const {
 }
 
 std::optional<Eigen::Quaterniond> Tracker::Rotation() const {
-  return velocity_.has_value() ? std::optional(velocity_->rotation) : std::nullopt;
+  return velocity_.has_value() && !shows_nothing_ ? std::optional(velocity_->rotation) : std::nullopt;
+}
+
+// No light, a hand before the lens: the next frame goes on from the last one.
+bool Tracker::ShowsNothing() {
+  const auto needed = static_cast<size_t>(options_.min_motion_inliers);
+  if (frame_.features.size() >= needed) return false;
+  reason_ = fmt::format("lost: the image shows nothing, {} keypoints < {}", frame_.features.size(), needed);
+  return true;
 }
 
 bool Tracker::TrackFrame() {

@@ -63,7 +63,7 @@ class Tracker {
   // come to yet.
   TrackingResult Track(const FrameObjects& objects = {}, int keyframes_waiting = 0);
 
-  // The rotation that was found; none without a pose in this frame or the last.
+  // The rotation that was found since the last frame that showed anything; none without a pose in both.
   std::optional<Eigen::Quaterniond> Rotation() const;
 
   // The map was read from a file: the camera is somewhere in it, or somewhere else. Before the first image.
@@ -92,6 +92,7 @@ class Tracker {
   void ForgetPose();
   PartId PartOfFrame() const;
   int KeyframesIn(PartId part) const;
+  bool ShowsNothing();
   bool TrackFrame();
   bool TrackFromLastFrame();
   bool Relocalise();
@@ -126,6 +127,7 @@ class Tracker {
   TrackingState state_ = TrackingState::kInitialising;
   Frame frame_, last_;
   bool last_has_pose_ = false;
+  bool shows_nothing_ = false;  // the frame, after one with a pose: last_ stays the last one
   bool start_is_certain_ = true;
   PartId start_part_;               // of the map, that the last start made
   bool start_is_young_ = false;     // its part is erased when the camera is lost now
