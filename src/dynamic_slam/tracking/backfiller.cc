@@ -114,6 +114,7 @@ bool Backfiller::Spread(const std::function<bool()>& should_stop, Known* known,
 
 bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* known,
                            std::vector<AnchoredPose>* found) {
+  if (!(interval_s_ > 0)) return true;  // nobody knows which frames are in a row
   Known with_recognised = *known;
   for (const KeptFrame& kept : kept_) {
     if (known->contains(kept.timestamp_s)) continue;

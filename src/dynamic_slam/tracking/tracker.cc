@@ -57,6 +57,8 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       random_(seed) {}
 
 void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask) {
+  image_interval_s_ = timestamp_s - frame_.timestamp_s;
+  follows_nothing_ = shows_nothing_;
   if (!shows_nothing_) std::swap(frame_, last_);
   shows_nothing_ = false;
   frame_.id = id;
@@ -71,11 +73,12 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   extractor_.Extract(grey, mask, &frame_.features);
   frame_.static_probability.clear();
   frame_.ClearLandmarks();
-  shutter_.Expect(PredictMotion(), last_, &frame_);
+  const std::optional<Rigid3> motion = PredictMotion(frame_.timestamp_s - last_.timestamp_s);
+  shutter_.Expect(motion, last_, &frame_);
   frame_.reference = last_.reference;
   frame_.reference_unit = 1;
   DS_TRACE("tracking/flow");
-  flow_.Match(last_, filter_.Boxes(), PredictedRotation(), frame_);
+  flow_.Match(last_, filter_.Boxes(), motion ? std::optional(motion->rotation) : std::nullopt, frame_);
 }
 
 // Where people fill the view, their clothes have more and stronger corners than the ceiling and the floor,
@@ -113,15 +116,17 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   late_judgement_.Judge(objects.late, filter_, &initializer_, map_);
   untold_from_ = objects.untold_from;
   const DynamicKeypoints judged = filter_.Judge(objects.boxes, flow_, last_, &frame_);
-  share_in_boxes_ = frame_.features.size() == 0
-                        ? 0
-                        : static_cast<double>(judged.InBoxes()) / static_cast<double>(frame_.features.size());
+  shows_nothing_ = last_has_pose_ && ShowsNothing();
+  if (!shows_nothing_) {
+    share_in_boxes_ = frame_.features.size() == 0 ? 0
+                                                  : static_cast<double>(judged.InBoxes()) /
+                                                        static_cast<double>(frame_.features.size());
+  }
 
   TrackingResult result;
   result.dynamic = judged;
   result.keypoints = static_cast<int>(frame_.features.size());
   if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
-  shows_nothing_ = last_has_pose_ && ShowsNothing();
   if (!shows_nothing_ && ((last_has_pose_ && TrackFrame()) || Relocalise())) {
     AcceptPose();
     if (!start_is_certain_) ReviewStart(&result);
@@ -313,21 +318,21 @@ void Tracker::RefreshLastFrame() {
   }
 }
 
-// Goes on as the camera went between the last two frames, for as long as this one took to come.
-std::optional<Rigid3> Tracker::PredictMotion() const {
+// Goes on as the camera went between the last two frames.
+std::optional<Rigid3> Tracker::PredictMotion(double dt_s) const {
   if (!velocity_.has_value()) return std::nullopt;
-  const double dt_s = frame_.timestamp_s - last_.timestamp_s;
   const double steps = velocity_dt_s_ > 0 ? std::clamp(dt_s / velocity_dt_s_, 0.0, kMaxPredictionSteps) : 1;
   return Rigid3(ExpSo3(steps * LogSo3(velocity_->rotation)), steps * velocity_->translation);
 }
 
 std::optional<Eigen::Quaterniond> Tracker::PredictedRotation() const {
-  const std::optional<Rigid3> motion = PredictMotion();
+  const std::optional<Rigid3> motion = PredictMotion(image_interval_s_);
   return motion.has_value() ? std::optional(motion->rotation) : std::nullopt;
 }
 
 std::optional<Eigen::Quaterniond> Tracker::Rotation() const {
-  return velocity_.has_value() && !shows_nothing_ ? std::optional(velocity_->rotation) : std::nullopt;
+  const bool is_since_last_image = !shows_nothing_ && !follows_nothing_;
+  return velocity_.has_value() && is_since_last_image ? std::optional(velocity_->rotation) : std::nullopt;
 }
 
 // No light, a hand before the lens: the next frame goes on from the last one.
@@ -349,7 +354,8 @@ bool Tracker::TrackFrame() {
 }
 
 bool Tracker::TrackFromLastFrame() {
-  const Rigid3 predicted = PredictMotion().value_or(Rigid3()) * last_.cam_from_world;
+  const Rigid3 predicted =
+      PredictMotion(frame_.timestamp_s - last_.timestamp_s).value_or(Rigid3()) * last_.cam_from_world;
   int inliers =
       localiser_.pose_tracker().TrackFromFrame(last_, predicted, options_.motion_radius_px, &frame_);
   if (inliers < options_.min_motion_inliers) {

@@ -53,17 +53,20 @@ class Tracker {
   // grey: CV_8UC1 of the camera's size. mask: empty, or CV_8UC1, not 0 where keypoints are forbidden.
   void Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const cv::Mat& mask);
 
-  // The rotation that the motion model expects since the last frame, x_in_this = R x_in_last; after Extract.
+  // The rotation that the motion model expects since the last image, x_in_this = R x_in_last; after Extract.
   std::optional<Eigen::Quaterniond> PredictedRotation() const;
 
-  // How keypoints in and around dynamic boxes moved since the last frame; after Extract.
-  const std::vector<PointMotion>& Motions() const { return flow_.motions(); }
+  // How keypoints in and around dynamic boxes moved since the last image; none when that showed nothing.
+  // After Extract.
+  std::span<const PointMotion> Motions() const {
+    return follows_nothing_ ? std::span<const PointMotion>() : std::span(flow_.motions());
+  }
 
   // Finds the pose of the frame. objects: what is in it. keyframes_waiting: those that local mapping has not
   // come to yet.
   TrackingResult Track(const FrameObjects& objects = {}, int keyframes_waiting = 0);
 
-  // The rotation that was found since the last frame that showed anything; none without a pose in both.
+  // The rotation that was found since the last image; none without a pose in both.
   std::optional<Eigen::Quaterniond> Rotation() const;
 
   // The map was read from a file: the camera is somewhere in it, or somewhere else. Before the first image.
@@ -99,7 +102,7 @@ class Tracker {
   int MinInliers() const;
   bool TrackLocalMap();
   void RefreshLastFrame();
-  std::optional<Rigid3> PredictMotion() const;
+  std::optional<Rigid3> PredictMotion(double dt_s) const;
   double MedianDepthOfFrame();
   void CountVisibility();
   void InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result);
@@ -127,7 +130,10 @@ class Tracker {
   TrackingState state_ = TrackingState::kInitialising;
   Frame frame_, last_;
   bool last_has_pose_ = false;
-  bool shows_nothing_ = false;  // the frame, after one with a pose: last_ stays the last one
+  // Too few keypoints, though last_ has a pose: the next frame takes this one's place and goes on from last_.
+  bool shows_nothing_ = false;
+  bool follows_nothing_ = false;  // the image before this one was such a frame
+  double image_interval_s_ = 0;   // since the last image
   bool start_is_certain_ = true;
   PartId start_part_;               // of the map, that the last start made
   bool start_is_young_ = false;     // its part is erased when the camera is lost now
