@@ -192,6 +192,8 @@ class FrameCharts {
     return {{"name", name}, {"colour", colour}, {"v", std::move(values)}};
   }
 
+  // series: an array. One that has a single member is made by Json::array: of braces alone clang makes the
+  // member.
   Json Chart(const std::string& title, const std::string& unit, const std::string& kind, Json series) const {
     return {{"title", title}, {"unit", unit}, {"kind", kind}, {"t", times_}, {"series", std::move(series)}};
   }
@@ -217,7 +219,8 @@ Json ErrorChart(const Run& run, const std::string& title, const std::string& uni
           {"unit", unit},
           {"kind", "line"},
           {"t", std::move(times)},
-          {"series", {{{"name", title.substr(0, 3)}, {"colour", colour}, {"v", std::move(values)}}}}};
+          {"series",
+           Json::array({{{"name", title.substr(0, 3)}, {"colour", colour}, {"v", std::move(values)}}})}};
 }
 
 Json ChartsSection(const Run& run, const std::string& title, const std::string& note, Json charts) {
@@ -250,8 +253,8 @@ Json KeypointsSection(const Run& run) {
       charts.Series("static", "c3", [](const Frame& f) { return f.dynamic.outside; }),
       charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.dynamic.kept; }),
       charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.dynamic.culled; })};
-  const Json inliers = {
-      charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })};
+  const Json inliers = Json::array(
+      {charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })});
   return ChartsSection(
       run, "Keypoints",
       "Static ones lie in no box of a dynamic object. Of the dynamic ones, those are kept that "
@@ -273,10 +276,10 @@ Json MapSection(const Run& run) {
 Json StagesSection(const Run& run) {
   Json rows = Json::array();
   const auto add = [&rows](const char* name, const TimeStatistics& ms) {
-    rows.push_back(
-        {{"name", name},
-         {"values",
-          {{{"v", Rounded(ms.median, 3)}, {"lo", Rounded(ms.median, 3)}, {"hi", Rounded(ms.p95, 3)}}}}});
+    rows.push_back({{"name", name},
+                    {"values", Json::array({{{"v", Rounded(ms.median, 3)},
+                                             {"lo", Rounded(ms.median, 3)},
+                                             {"hi", Rounded(ms.p95, 3)}}})}});
   };
   add("tracking, a frame", run.summary.tracking_ms);
   if (run.summary.detection.has_value()) {
@@ -290,16 +293,16 @@ Json StagesSection(const Run& run) {
           {"note", fmt::format("Median, and what 95% stay below. {:.1f} s in all, {:.0f} MB at most.",
                                run.summary.wall_s, run.summary.peak_rss_mb)},
           {"unit", "ms"},
-          {"series", {{{"name", "median"}, {"colour", "c1"}}}},
+          {"series", Json::array({{{"name", "median"}, {"colour", "c1"}}})},
           {"rows", std::move(rows)}};
 }
 
 Json TrackingTimeSection(const Run& run) {
   const FrameCharts charts(run);
-  const Json series = {charts.Series(
-      "tracking", "c1", [](const RunSummary::FrameRecord& f) { return Rounded(f.tracking_ms, 2); })};
+  const Json series = Json::array({charts.Series(
+      "tracking", "c1", [](const RunSummary::FrameRecord& f) { return Rounded(f.tracking_ms, 2); })});
   return ChartsSection(run, "Time of the frames", "From the image in memory to its pose.",
-                       {charts.Chart("Tracking", "ms", "line", series)});
+                       Json::array({charts.Chart("Tracking", "ms", "line", series)}));
 }
 
 using BoxesByStamp = std::map<int64_t, std::vector<BoxRecord>>;
@@ -346,10 +349,11 @@ Json RecallSection(const Run& run) {
 
 Json ObjectsSection(const Run& run) {
   const FrameCharts charts(run);
-  const Json series = {
-      charts.Series("objects", "c1", [](const RunSummary::FrameRecord& f) { return f.objects; })};
-  return ChartsSection(run, "Detector", "True boxes are not known here.",
-                       {charts.Chart("Objects in the frame, detected or compensated", "", "line", series)});
+  const Json series = Json::array(
+      {charts.Series("objects", "c1", [](const RunSummary::FrameRecord& f) { return f.objects; })});
+  return ChartsSection(
+      run, "Detector", "True boxes are not known here.",
+      Json::array({charts.Chart("Objects in the frame, detected or compensated", "", "line", series)}));
 }
 
 Json ConfigSection(const SystemOptions& options) {
