@@ -116,9 +116,11 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* know
                            std::vector<AnchoredPose>* found) {
   if (!(interval_s_ > 0)) return true;  // nobody knows which frames are in a row
   Known with_recognised = *known;
+  bool goes_on = true;
   for (const KeptFrame& kept : kept_) {
     if (known->contains(kept.timestamp_s)) continue;
-    if (should_stop && should_stop()) return false;
+    goes_on = !should_stop || !should_stop();
+    if (!goes_on) break;
     Frame frame = FrameOf(kept);
     if (!localiser_.Relocalise(kept.min_inliers, random_, &frame).has_value()) continue;
     const std::optional<AnchoredPose> pose = PlausiblePose(*known, kept, &frame);
@@ -130,13 +132,14 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* know
       return std::abs(other.timestamp_s - pose->first) <= kNextFrame * interval_s_ &&
              AreInOnePart(other, pose->second) && IsReachable(other, pose->second);
     };
-    if ((pose != with_recognised.begin() && agrees(std::prev(pose)->second)) ||
-        (std::next(pose) != with_recognised.end() && agrees(std::next(pose)->second))) {
-      found->push_back(pose->second);
-    }
+    const bool is_confirmed = (pose != with_recognised.begin() && agrees(std::prev(pose)->second)) ||
+                              (std::next(pose) != with_recognised.end() && agrees(std::next(pose)->second));
+    // Others that were recognised before it are known by now.
+    if (!is_confirmed || !IsPlausible(*known, pose->second)) continue;
+    known->insert(*pose);
+    found->push_back(pose->second);
   }
-  for (const AnchoredPose& pose : *found) known->emplace(pose.timestamp_s, pose);
-  return true;
+  return goes_on;
 }
 
 void Backfiller::CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const {

@@ -86,6 +86,24 @@ TEST_F(BackfillerTest, FarFromAnyPoseWhatNoFrameBesideItConfirmsIsNoPose) {
   EXPECT_THAT(backfiller_.Find(known_, {}), IsEmpty());
 }
 
+TEST_F(BackfillerTest, OfTwoPlacesThatContradictEachOtherOneIsBelieved) {
+  for (const auto& [t, x] : {std::pair(100.0, 0.0), {100.05, 0.05}, {100.1, 1.0}, {100.15, 1.05}})
+    backfiller_.Keep(FrameAt(t, SidewaysPose(x)), kMinInliers, false);
+  const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].timestamp_s, 100.0);
+  EXPECT_EQ(found[1].timestamp_s, 100.05);
+}
+
+TEST_F(BackfillerTest, WhatWasRecognisedBeforeItIsStoppedStays) {
+  for (const double t : {100.0, 100.05, 100.1})
+    backfiller_.Keep(FrameAt(t, SidewaysPose(t - 99.5)), kMinInliers, false);
+  // Three neighbours are asked for each way, then the looks of the first two.
+  int asked = 0;
+  const std::vector<AnchoredPose> found = backfiller_.Find(known_, [&asked] { return ++asked >= 9; });
+  EXPECT_EQ(found.size(), 2u) << asked;
+}
+
 TEST_F(BackfillerTest, MatchesThatLieAnywhereWithinTheLimitAreNoPose) {
   const double limit_px = std::sqrt(TrackerOptions().pose.chi2);
   for (const double share : {0.0, 1.0}) {
