@@ -283,11 +283,11 @@ bool PoseOptimizer::Classify(const PoseObservations& all, double chi2, PoseEstim
   return changed;
 }
 
-double RightInliers(const PoseEstimate& estimate, double chi2) {
+double RightShare(const PoseEstimate& estimate, double chi2) {
+  if (estimate.inliers == 0) return 0;
   const double tail = std::exp(-chi2 / 2);
   const double by_chance = chi2 / 2, right = 2 - chi2 * tail / (1 - tail);
-  const double share = (by_chance - estimate.rms_px * estimate.rms_px) / (by_chance - right);
-  return std::clamp(share, 0.0, 1.0) * estimate.inliers;
+  return std::clamp((by_chance - estimate.rms_px * estimate.rms_px) / (by_chance - right), 0.0, 1.0);
 }
 
 }  // namespace dynamic_slam

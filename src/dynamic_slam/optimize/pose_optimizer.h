@@ -62,10 +62,10 @@ struct PoseEstimate {
   bool converged = false;
 };
 
-// How many of the inliers can be right matches, by how near they are: of a squared error of up to `chi2`, in
-// sigmas, matches by chance have half in the mean, and right ones what is left of a Gaussian. 0 to the
-// inliers.
-double RightInliers(const PoseEstimate& estimate, double chi2);
+// The share of the inliers that can be right matches, by how near they are: of a squared error of up to
+// `chi2`, in sigmas, matches by chance have half in the mean, and right ones what is left of a Gaussian. 0
+// to 1.
+double RightShare(const PoseEstimate& estimate, double chi2);
 
 // Finds the camera pose that minimises the reprojection error of known points: Eq. (10) of the paper, with
 // a Huber kernel, per-octave sigmas, weights, and outliers that are named anew after each round.

@@ -267,7 +267,7 @@ TEST(PoseOptimizer, ReuseOfObjectsChangesNothing) {
   EXPECT_EQ(estimate.information, fresh.information);
 }
 
-TEST(RightInliers, AreCountedAmongMatchesByChance) {
+TEST(RightShare, IsFoundAmongMatchesByChance) {
   Random random(5);
   PoseOptimizerOptions options;
   for (const int right : {0, 2000, 5000, 10000}) {
@@ -281,18 +281,18 @@ TEST(RightInliers, AreCountedAmongMatchesByChance) {
       ++estimate.inliers;
     }
     estimate.rms_px = std::sqrt(sum / estimate.inliers);
-    EXPECT_NEAR(RightInliers(estimate, options.chi2), right, 400) << right;
+    EXPECT_NEAR(RightShare(estimate, options.chi2), right / 10000.0, 0.04) << right;
   }
 }
 
-TEST(RightInliers, AreAllWhenTheyAreNearerThanTheirSigmasAndNoneWhenThereIsNone) {
+TEST(RightShare, IsAllOfWhatIsNearerThanItsSigmaAndNothingOfWhatIsFarther) {
   PoseEstimate estimate;
-  EXPECT_EQ(RightInliers(estimate, 5.991), 0);
+  EXPECT_EQ(RightShare(estimate, 5.991), 0);
   estimate.inliers = 50;
   estimate.rms_px = 0.5;
-  EXPECT_EQ(RightInliers(estimate, 5.991), 50);
+  EXPECT_EQ(RightShare(estimate, 5.991), 1);
   estimate.rms_px = std::sqrt(5.991);
-  EXPECT_EQ(RightInliers(estimate, 5.991), 0);
+  EXPECT_EQ(RightShare(estimate, 5.991), 0);
 }
 
 }  // namespace

@@ -164,18 +164,18 @@ int PoseTracker::OptimisePose(const Rigid3& initial_cam_from_world, Frame* frame
   rejected_.clear();
   DS_TRACE("tracking/pose");
   optimizer_.Optimize(observations_, initial_cam_from_world, &estimate_);
+  trusted_ = 0;
   if (!estimate_.converged) return 0;
   frame->cam_from_world = estimate_.cam_from_world;
-  double trusted = 0;
   for (size_t i = 0; i < observed_keypoints_.size(); ++i) {
     if (estimate_.is_inlier[i] != 0) {
-      trusted += observations_.weight[i];
+      trusted_ += observations_.weight[i];
       continue;
     }
     rejected_.push_back(frame->landmarks[observed_keypoints_[i]]);
     frame->landmarks[observed_keypoints_[i]] = LandmarkId();
   }
-  return static_cast<int>(std::lround(trusted));
+  return static_cast<int>(std::lround(trusted_));
 }
 
 void PoseTracker::TakeUnusable(const Frame& frame) {

@@ -34,8 +34,8 @@ class PoseTracker {
   // call.
   int TrackLocalMap(const LocalView& view, double radius_px, Frame* frame, std::vector<uint8_t>* in_view);
 
-  // How many of the inliers of the last pose can be right (see RightInliers of an estimate).
-  double RightInliers() const { return dynamic_slam::RightInliers(estimate_, options_.pose.chi2); }
+  // How many of the inliers of the last pose can be right, as they are trusted.
+  double RightInliers() const { return RightShare(estimate_, options_.pose.chi2) * trusted_; }
 
   // Landmarks that were matched and did not fit the last pose that was found.
   const std::vector<LandmarkId>& rejected() const { return rejected_; }
@@ -73,6 +73,7 @@ class PoseTracker {
   // Kept between frames for their memory.
   PoseObservations observations_;
   PoseEstimate estimate_;
+  double trusted_ = 0;  // its inliers, each as far as it is trusted
   std::vector<uint32_t> observed_keypoints_;
   std::vector<Candidate> candidates_;
   std::vector<uint8_t> taken_;
