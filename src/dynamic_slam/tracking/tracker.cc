@@ -115,17 +115,19 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   reason_.clear();
   late_judgement_.Judge(objects.late, filter_, &initializer_, map_);
   untold_from_ = objects.untold_from;
-  const DynamicKeypoints judged = filter_.Judge(objects.boxes, flow_, last_, &frame_);
+  TrackingResult result;
+  const size_t keypoints = frame_.features.size();
   shows_nothing_ = last_has_pose_ && ShowsNothing();
   if (!shows_nothing_) {
-    share_in_boxes_ = frame_.features.size() == 0 ? 0
-                                                  : static_cast<double>(judged.InBoxes()) /
-                                                        static_cast<double>(frame_.features.size());
+    result.dynamic = filter_.Judge(objects.boxes, flow_, last_, &frame_);
+    share_in_boxes_ =
+        keypoints == 0 ? 0 : static_cast<double>(result.dynamic.InBoxes()) / static_cast<double>(keypoints);
+  } else {  // what is known of the objects stays that of the last frame
+    frame_.static_probability.assign(keypoints, 1.0f);
+    frame_.motion_log_odds.assign(keypoints, 0.0f);
+    result.dynamic.outside = static_cast<int>(keypoints);
   }
-
-  TrackingResult result;
-  result.dynamic = judged;
-  result.keypoints = static_cast<int>(frame_.features.size());
+  result.keypoints = static_cast<int>(keypoints);
   if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
   if (!shows_nothing_ && ((last_has_pose_ && TrackFrame()) || Relocalise())) {
     AcceptPose();
