@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -42,6 +43,28 @@ std::vector<cv::Mat> BlackFrames(int count) {
 std::vector<cv::Mat> Join(std::vector<cv::Mat> a, const std::vector<cv::Mat>& b) {
   a.insert(a.end(), b.begin(), b.end());
   return a;
+}
+
+// Each small tile is moved by up to so much, by chance: corners match, but no pose explains where they are.
+cv::Mat Scattered(const cv::Mat& image, double most_px) {
+  constexpr int kTile = 32, kReach = 8;
+  Random random(7);
+  cv::Mat padded, scattered = image.clone();
+  cv::copyMakeBorder(image, padded, kReach, kReach, kReach, kReach, cv::BORDER_REFLECT);
+  for (int y = 0; y < image.rows; y += kTile) {
+    for (int x = 0; x < image.cols; x += kTile) {
+      const auto width = static_cast<float>(std::min(kTile, image.cols - x));
+      const auto height = static_cast<float>(std::min(kTile, image.rows - y));
+      const auto dx = static_cast<float>(random.Uniform(-most_px, most_px));
+      const auto dy = static_cast<float>(random.Uniform(-most_px, most_px));
+      const cv::Point2f centre(static_cast<float>(x + kReach) + (width - 1) / 2 + dx,
+                               static_cast<float>(y + kReach) + (height - 1) / 2 + dy);
+      cv::Mat tile;
+      cv::getRectSubPix(padded, cv::Size(static_cast<int>(width), static_cast<int>(height)), centre, tile);
+      tile.copyTo(scattered(cv::Rect(x, y, tile.cols, tile.rows)));
+    }
+  }
+  return scattered;
 }
 
 int CountState(const RunSummary& summary, TrackingState state) {
@@ -153,6 +176,22 @@ TEST_F(SystemTest, AfterImagesThatShowNothingItGoesOn) {
   }
   EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
             0.005 * PathLength(ToPoseList(room.truth())));
+}
+
+TEST_F(SystemTest, WhatFitsNoBetterThanChanceIsNoPose) {
+  const Room room = MakeRoom(90);
+  std::vector<cv::Mat> images = Frames(room, 0, 90);
+  images[80] = Scattered(images[80], 4);
+  ImageSource source(std::move(images));
+  SystemOptions options;
+  options.orb.levels = 1;  // all corners are equally exact
+  const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+  const RunSummary& summary = run.summary;
+  EXPECT_EQ(summary.frames[79].state, TrackingState::kTracking);
+  EXPECT_EQ(summary.frames[80].state, TrackingState::kLost);
+  EXPECT_THAT(summary.ReasonOf(80), HasSubstr("can be right")) << "many were found";
+  EXPECT_EQ(summary.frames[81].state, TrackingState::kTracking) << summary.ReasonOf(81);
+  EXPECT_THAT(summary.ReasonOf(81), HasSubstr("found again"));
 }
 
 TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {

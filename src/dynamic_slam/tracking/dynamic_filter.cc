@@ -348,8 +348,12 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
   const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
     if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
-    const Keypoint& before = last.features.keypoints[flow.last_keypoints()[i]];
     const Keypoint& now = frame->features.keypoints[i];
+    const auto is_around = [&](const Mover& mover) {
+      return mover.to.Contains(now.raw_x, now.raw_y, mover.ring_px);
+    };
+    if (std::none_of(movers_.begin(), movers_.end(), is_around)) continue;
+    const Keypoint& before = last.features.keypoints[flow.last_keypoints()[i]];
     const Eigen::Vector2d px(now.x, now.y), before_px(before.x, before.y);
     const std::optional<RestPlace> place = rest(before_px);
     if (!place.has_value()) continue;
@@ -358,17 +362,17 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
         std::numbers::sqrt2 * octave_scales_[static_cast<size_t>(std::max(now.octave, before.octave))];
     const double sigma_px = std::sqrt(Square(noise_px) + place->variance_px2);
     const double rest_error_px = DistanceToSegment(px, place->far_px, place->near_px);
+    // Spread over the segment and the noise about it.
     const double length_px = (place->near_px - place->far_px).norm();
-    const double log_rest = -0.5 * Square(rest_error_px / sigma_px) -
-                            std::log(2 * std::numbers::pi * sigma_px * sigma_px) -
-                            std::log1p(length_px / (std::sqrt(2 * std::numbers::pi) * sigma_px));
-    const double rest_density = std::exp(log_rest) + mismatch;
+    const double area_px2 =
+        2 * std::numbers::pi * sigma_px * (sigma_px + length_px / std::sqrt(2 * std::numbers::pi));
+    const double rest_density = std::exp(-0.5 * Square(rest_error_px / sigma_px)) / area_px2 + mismatch;
     // It belongs to any of the objects about it, each as likely as the other: that it does not move as one
     // who walks tells little where another stands.
     double sum_density = 0;
     int objects = 0;
     for (const Mover& mover : movers_) {
-      if (!mover.to.Contains(now.raw_x, now.raw_y, mover.ring_px)) continue;
+      if (!is_around(mover)) continue;
       ++objects;
       const Eigen::Vector2d center(mover.from.CenterX(), mover.from.CenterY());
       const Eigen::Vector2d raw_before(before.raw_x, before.raw_y);
@@ -386,7 +390,7 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
                              (2 * std::numbers::pi * mover_sigma_px * mover_sigma_px);
       sum_density += density + mismatch;
     }
-    const double evidence = objects == 0 ? 0 : std::log(rest_density * objects / sum_density);
+    const double evidence = std::log(rest_density * objects / sum_density);
     AddEvidence(static_cast<float>(std::clamp(evidence, -kMostEvidence, kMostEvidence)), i, frame);
   }
 }

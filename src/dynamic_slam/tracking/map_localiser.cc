@@ -80,6 +80,7 @@ void MapLocaliser::FindCandidates(const Frame& frame) {
 
 std::optional<MapLocaliser::Place> MapLocaliser::Relocalise(int min_inliers, Random& random, Frame* frame) {
   FindCandidates(*frame);
+  const int needed = std::max(options_.min_relocalisation_inliers, min_inliers);
   for (const KeyframeId candidate : candidates_) {
     int inliers = 0;
     if (const auto map = map_->Read(); const Keyframe* keyframe = map->keyframes().Find(candidate)) {
@@ -89,8 +90,7 @@ std::optional<MapLocaliser::Place> MapLocaliser::Relocalise(int min_inliers, Ran
     if (TrackLocalMap(kRelocalisedSearch * options_.local_map_radius_px, frame) < min_inliers) continue;
     // Once more from the better pose, with the narrow window.
     inliers = TrackLocalMap(options_.local_map_radius_px, frame);
-    if (inliers >= std::max(options_.min_relocalisation_inliers, min_inliers))
-      return Place{candidate, inliers};
+    if (pose_tracker_.RightInliers() >= needed) return Place{candidate, inliers};
   }
   frame->ClearLandmarks();
   return std::nullopt;

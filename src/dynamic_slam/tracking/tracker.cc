@@ -129,7 +129,7 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   }
   result.keypoints = static_cast<int>(keypoints);
   if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
-  if (!shows_nothing_ && ((last_has_pose_ && TrackFrame()) || Relocalise())) {
+  if (!shows_nothing_ && (last_has_pose_ ? TrackFrame() : Relocalise())) {
     AcceptPose();
     if (!start_is_certain_) ReviewStart(&result);
     if (state_ == TrackingState::kTracking && !result.part_was_erased) {
@@ -373,8 +373,10 @@ bool Tracker::TrackFromLastFrame() {
   return TrackLocalMap();
 }
 
-int Tracker::MinInliers() const {
-  const double more = share_in_boxes_ * (options_.movers_min_inliers - options_.min_inliers);
+int Tracker::MinInliers() const { return ScaledMinInliers(share_in_boxes_); }
+
+int Tracker::ScaledMinInliers(double share_of_movers) const {
+  const double more = share_of_movers * (options_.movers_min_inliers - options_.min_inliers);
   // The options count for 1,000 keypoints: among more of them, more fit by chance, or move together.
   const double keypoints = std::min(static_cast<double>(frame_.features.size()), 1.0 * orb_options_.features);
   return static_cast<int>(
@@ -390,8 +392,17 @@ bool Tracker::TrackLocalMap() {
   CorrectShutter();
   inliers_ = localiser_.MatchView(options_.local_map_radius_px, &frame_);
   const int min_inliers = MinInliers();
-  if (inliers_ >= min_inliers) return true;
-  reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
+  if (inliers_ < min_inliers) {
+    reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
+    return false;
+  }
+  // Among chance matches, as in a blurred image, some pose always fits. How well they fit tells them, but not
+  // those that move together.
+  const double right = localiser_.pose_tracker().RightInliers();
+  const int min_right = ScaledMinInliers(0);
+  if (right >= min_right) return true;
+  reason_ = fmt::format("lost: of {} landmarks of the local map found {:.0f} can be right < {}", inliers_,
+                        std::floor(right), min_right);
   return false;
 }
 
@@ -404,8 +415,7 @@ bool Tracker::Relocalise() {
   }
   inliers_ = 0;
   if (localiser_.candidates() == 0) return false;
-  reason_ = fmt::format("{}; none of {} keyframes matches the image",
-                        reason_.empty() ? fmt::format("lost for {} frames", lost_frames_ + 1) : reason_,
+  reason_ = fmt::format("lost for {} frames; none of {} keyframes matches the image", lost_frames_ + 1,
                         localiser_.candidates());
   return false;
 }

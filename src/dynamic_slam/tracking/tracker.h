@@ -100,6 +100,8 @@ class Tracker {
   bool TrackFromLastFrame();
   bool Relocalise();
   int MinInliers() const;
+  // share_of_movers: of the keypoints, those that are in boxes of movers.
+  int ScaledMinInliers(double share_of_movers) const;
   bool TrackLocalMap();
   void RefreshLastFrame();
   std::optional<Rigid3> PredictMotion(double dt_s) const;
