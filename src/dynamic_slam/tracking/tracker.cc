@@ -151,7 +151,7 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
         part == start_part_ && (!start_is_certain_ || KeyframesIn(part) <= options_.small_map_keyframes);
   }
   result.may_be_erased = start_is_young_;
-  result.min_inliers = MinInliers();
+  result.min_inliers = Limits().found;
   result.state = state_;
   result.inliers = inliers_;
   result.reason = reason_;
@@ -373,14 +373,9 @@ bool Tracker::TrackFromLastFrame() {
   return TrackLocalMap();
 }
 
-int Tracker::MinInliers() const { return ScaledMinInliers(share_in_boxes_); }
-
-int Tracker::ScaledMinInliers(double share_of_movers) const {
-  const double more = share_of_movers * (options_.movers_min_inliers - options_.min_inliers);
-  // The options count for 1,000 keypoints: among more of them, more fit by chance, or move together.
-  const double keypoints = std::min(static_cast<double>(frame_.features.size()), 1.0 * orb_options_.features);
-  return static_cast<int>(
-      std::lround(std::max(1.0, keypoints / 1000) * (options_.min_inliers + std::max(more, 0.0))));
+InlierLimits Tracker::Limits() const {
+  const size_t keypoints = std::min(frame_.features.size(), static_cast<size_t>(orb_options_.features));
+  return NeededInliers(options_, keypoints, share_in_boxes_);
 }
 
 bool Tracker::TrackLocalMap() {
@@ -391,23 +386,21 @@ bool Tracker::TrackLocalMap() {
   // The local map knows the pose better than the last frame's landmarks did, and with it the motion.
   CorrectShutter();
   inliers_ = localiser_.MatchView(options_.local_map_radius_px, &frame_);
-  const int min_inliers = MinInliers();
-  if (inliers_ < min_inliers) {
-    reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, min_inliers);
+  const InlierLimits limits = Limits();
+  if (inliers_ < limits.found) {
+    reason_ = fmt::format("lost: {} landmarks of the local map found < {}", inliers_, limits.found);
     return false;
   }
-  // Among chance matches, as in a blurred image, some pose always fits. How well they fit tells them, but not
-  // those that move together.
+  // Among chance matches, as in a blurred image, some pose always fits.
   const double right = localiser_.pose_tracker().RightInliers();
-  const int min_right = ScaledMinInliers(0);
-  if (right >= min_right) return true;
+  if (right >= limits.right) return true;
   reason_ = fmt::format("lost: of {} landmarks of the local map found {:.0f} can be right < {}", inliers_,
-                        std::floor(right), min_right);
+                        std::floor(right), limits.right);
   return false;
 }
 
 bool Tracker::Relocalise() {
-  const std::optional<MapLocaliser::Place> place = localiser_.Relocalise(MinInliers(), random_, &frame_);
+  const std::optional<MapLocaliser::Place> place = localiser_.Relocalise(Limits().found, random_, &frame_);
   if (place.has_value()) {
     inliers_ = place->inliers;
     reason_ = fmt::format("found again by keyframe {}", place->keyframe.value());

@@ -16,6 +16,7 @@
 #include "dynamic_slam/semantics/frame_objects.h"
 #include "dynamic_slam/tracking/dynamic_filter.h"
 #include "dynamic_slam/tracking/initializer.h"
+#include "dynamic_slam/tracking/inlier_limits.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
 #include "dynamic_slam/tracking/late_judgement.h"
 #include "dynamic_slam/tracking/map_localiser.h"
@@ -99,9 +100,7 @@ class Tracker {
   bool TrackFrame();
   bool TrackFromLastFrame();
   bool Relocalise();
-  int MinInliers() const;
-  // share_of_movers: of the keypoints, those that are in boxes of movers.
-  int ScaledMinInliers(double share_of_movers) const;
+  InlierLimits Limits() const;
   bool TrackLocalMap();
   void RefreshLastFrame();
   std::optional<Rigid3> PredictMotion(double dt_s) const;
