@@ -150,6 +150,8 @@ class SlamNodeTest(unittest.TestCase):
         self.assertEqual(set(statuses), {"slam_node: tracking", "slam_node: detector", "slam_node: images"})
         tracking = [s for m in diagnostics.messages for s in m.status if s.name == "slam_node: tracking"]
         self.assertEqual(tracking[-1].level, DiagnosticStatus.OK)
+        said = [s.message for s in tracking if s.message != "Node starting up"]  # which the updater says
+        self.assertIn("no camera_info", said[0])
 
         parts = self.service("get_trajectory", GetTrajectory)()
         self.assertTrue(parts.success)

@@ -14,8 +14,8 @@ struct InlierLimits {
   int right = 0;  // that can be right by how well they fit (RightShare)
 };
 
-// keypoints: of the frame, at most as many as are asked for without movers. share_of_movers: of all, those in boxes of
-// movers.
+// keypoints: of the frame, at most as many as are asked for without movers. share_of_movers: of all, those in
+// boxes of movers.
 inline InlierLimits NeededInliers(const TrackerOptions& options, size_t keypoints, double share_of_movers) {
   // The options count for 1,000 keypoints: among more of them, more fit by chance, or move together.
   const double scale = std::max(1.0, static_cast<double>(keypoints) / 1000);
