@@ -123,7 +123,7 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* know
     if (!goes_on) break;
     Frame frame = FrameOf(kept);
     if (!localiser_.Relocalise(kept.min_inliers, random_, &frame).has_value()) continue;
-    const std::optional<AnchoredPose> pose = PlausiblePose(*known, kept, &frame);
+    const std::optional<AnchoredPose> pose = PlausiblePose(*known, &frame);
     if (pose.has_value()) with_recognised.emplace(pose->timestamp_s, *pose);
   }
   for (auto pose = with_recognised.begin(); pose != with_recognised.end(); ++pose) {
@@ -173,9 +173,7 @@ Frame Backfiller::FrameOf(const KeptFrame& kept) {
   return frame;
 }
 
-std::optional<AnchoredPose> Backfiller::PlausiblePose(const Known& known, const KeptFrame& kept,
-                                                      Frame* frame) {
-  if (localiser_.pose_tracker().RightInliers() < kept.min_inliers) return std::nullopt;
+std::optional<AnchoredPose> Backfiller::PlausiblePose(const Known& known, Frame* frame) {
   localiser_.Anchor(frame);
   const AnchoredPose pose{frame->timestamp_s, frame->reference, frame->cam_from_reference};
   return IsPlausible(known, pose) ? std::optional(pose) : std::nullopt;
@@ -199,8 +197,9 @@ std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const Known& known, K
                                &frame) < options_.min_motion_inliers)
         continue;
       CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
-      if (localiser_.TrackLocalMap(options_.local_map_radius_px, &frame) < kept->min_inliers) continue;
-      const std::optional<AnchoredPose> pose = PlausiblePose(known, *kept, &frame);
+      localiser_.TrackLocalMap(options_.local_map_radius_px, &frame);
+      if (localiser_.pose_tracker().RightInliers() < kept->min_inliers) continue;
+      const std::optional<AnchoredPose> pose = PlausiblePose(known, &frame);
       if (pose.has_value()) return pose;
     }
   }

@@ -77,7 +77,7 @@ class Backfiller {
   std::optional<AnchoredPose> FindFromNeighbours(const Known& known, KeptFrame* kept);
   Frame FrameOf(const KeptFrame& kept);
   // Anchors the frame at the pose that the localiser found; none if that cannot be.
-  std::optional<AnchoredPose> PlausiblePose(const Known& known, const KeptFrame& kept, Frame* frame);
+  std::optional<AnchoredPose> PlausiblePose(const Known& known, Frame* frame);
   std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
   // Adds where the camera is at the stamp if it went on as between the two poses, and where it was at the
   // nearer.

@@ -175,11 +175,6 @@ void Tracker::AcceptPose() {
   localiser_.Anchor(&frame_);
   velocity_.reset();
   if (!last_has_pose_) return;
-  if (frame_.reference != last_.reference) {
-    // Found again in another part, with an origin and a unit of its own?
-    const auto map = map_->Read();
-    if (map->PartOf(last_.reference) != map->PartOf(frame_.reference)) return;
-  }
   velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
   velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
   if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
