@@ -31,10 +31,18 @@ bool IsSameCamera(const Camera& a, const Camera& b) {
   return numbers(a) == numbers(b);
 }
 
+class NoWork final : public cv::ParallelLoopBody {
+ public:
+  void operator()(const cv::Range&) const override {}
+};
+
+// Made before any thread: how OpenCV's threads take over what was made later, ThreadSanitizer does not see.
+const NoWork no_work;
+
 // The threads that OpenCV keeps for images serve the detector as well. Started by tracking, they would
 // inherit its priority, and keep it.
 void StartImageThreads() {
-  cv::parallel_for_(cv::Range(0, 4 * std::max(1, cv::getNumThreads())), [](const cv::Range&) {});
+  cv::parallel_for_(cv::Range(0, 4 * std::max(1, cv::getNumThreads())), no_work);
 }
 
 // In realtime mapping and the detector have a processor each.
