@@ -112,13 +112,13 @@ nlohmann::ordered_json Bars(const std::vector<ProfileRuns>& all, const std::stri
                {"lo", Rounded(scale * values.front(), 4)},
                {"hi", Rounded(scale * values.back(), 4)}};
     }
-    rows.push_back({{"name", runs.name}, {"values", {value}}});
+    rows.push_back({{"name", runs.name}, {"values", nlohmann::ordered_json::array({value})}});
   }
   return {{"type", "bars"},
           {"title", title},
           {"note", "Mean, least and greatest of the runs."},
           {"unit", unit},
-          {"series", {{{"name", "mean"}, {"colour", colour}}}},
+          {"series", nlohmann::ordered_json::array({{{"name", "mean"}, {"colour", colour}}})},
           {"rows", std::move(rows)}};
 }
 
