@@ -192,10 +192,10 @@ class FrameCharts {
     return {{"name", name}, {"colour", colour}, {"v", std::move(values)}};
   }
 
-  // series: an array. One that has a single member is made by Json::array: of braces alone clang makes the
-  // member.
-  Json Chart(const std::string& title, const std::string& unit, const std::string& kind, Json series) const {
-    return {{"title", title}, {"unit", unit}, {"kind", kind}, {"t", times_}, {"series", std::move(series)}};
+  // A vector, as of braces with a single Json in them clang makes that Json, and not an array of it.
+  Json Chart(const std::string& title, const std::string& unit, const std::string& kind,
+             const std::vector<Json>& series) const {
+    return {{"title", title}, {"unit", unit}, {"kind", kind}, {"t", times_}, {"series", series}};
   }
 
  private:
@@ -223,16 +223,13 @@ Json ErrorChart(const Run& run, const std::string& title, const std::string& uni
            Json::array({{{"name", title.substr(0, 3)}, {"colour", colour}, {"v", std::move(values)}}})}};
 }
 
-Json ChartsSection(const Run& run, const std::string& title, const std::string& note, Json charts) {
-  return {{"type", "charts"},
-          {"title", title},
-          {"note", note},
-          {"range", run.Range()},
-          {"charts", std::move(charts)}};
+Json ChartsSection(const Run& run, const std::string& title, const std::string& note,
+                   const std::vector<Json>& charts) {
+  return {{"type", "charts"}, {"title", title}, {"note", note}, {"range", run.Range()}, {"charts", charts}};
 }
 
 Json ErrorsSection(const Run& run) {
-  Json charts = Json::array();
+  std::vector<Json> charts;
   charts.push_back(
       ErrorChart(run, "APE, translation", "m", run.truth->ape.errors, &PoseError::translation_m, "c1"));
   if (!run.relative.empty()) {
@@ -243,18 +240,18 @@ Json ErrorsSection(const Run& run) {
       run, "Errors",
       "Absolute (APE) after alignment by a similarity, and relative (RPE) from one frame with "
       "a pose to the next, as evo defines them.",
-      std::move(charts));
+      charts);
 }
 
 Json KeypointsSection(const Run& run) {
   using Frame = RunSummary::FrameRecord;
   const FrameCharts charts(run);
-  const Json stack = {
+  const std::vector<Json> stack = {
       charts.Series("static", "c3", [](const Frame& f) { return f.dynamic.outside; }),
       charts.Series("dynamic, kept", "c5", [](const Frame& f) { return f.dynamic.kept; }),
       charts.Series("dynamic, culled", "c2", [](const Frame& f) { return f.dynamic.culled; })};
-  const Json inliers = Json::array(
-      {charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })});
+  const std::vector<Json> inliers = {
+      charts.Series("landmarks that hold the pose", "c1", [](const Frame& f) { return f.inliers; })};
   return ChartsSection(
       run, "Keypoints",
       "Static ones lie in no box of a dynamic object. Of the dynamic ones, those are kept that "
@@ -299,10 +296,10 @@ Json StagesSection(const Run& run) {
 
 Json TrackingTimeSection(const Run& run) {
   const FrameCharts charts(run);
-  const Json series = Json::array({charts.Series(
-      "tracking", "c1", [](const RunSummary::FrameRecord& f) { return Rounded(f.tracking_ms, 2); })});
+  const std::vector<Json> series = {charts.Series(
+      "tracking", "c1", [](const RunSummary::FrameRecord& f) { return Rounded(f.tracking_ms, 2); })};
   return ChartsSection(run, "Time of the frames", "From the image in memory to its pose.",
-                       Json::array({charts.Chart("Tracking", "ms", "line", series)}));
+                       {charts.Chart("Tracking", "ms", "line", series)});
 }
 
 using BoxesByStamp = std::map<int64_t, std::vector<BoxRecord>>;
@@ -349,11 +346,10 @@ Json RecallSection(const Run& run) {
 
 Json ObjectsSection(const Run& run) {
   const FrameCharts charts(run);
-  const Json series = Json::array(
-      {charts.Series("objects", "c1", [](const RunSummary::FrameRecord& f) { return f.objects; })});
-  return ChartsSection(
-      run, "Detector", "True boxes are not known here.",
-      Json::array({charts.Chart("Objects in the frame, detected or compensated", "", "line", series)}));
+  const std::vector<Json> series = {
+      charts.Series("objects", "c1", [](const RunSummary::FrameRecord& f) { return f.objects; })};
+  return ChartsSection(run, "Detector", "True boxes are not known here.",
+                       {charts.Chart("Objects in the frame, detected or compensated", "", "line", series)});
 }
 
 Json ConfigSection(const SystemOptions& options) {
