@@ -2,7 +2,9 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -25,10 +27,17 @@ constexpr int kPaperFrames = 487, kPaperFoundBefore = 401, kPaperFoundAfter = 48
 
 struct RecallArguments : BenchArguments {
   std::string source;
+  int seeds = 3;
 };
 
 struct RecallOfFrame {
   double timestamp_s = 0;
+  DetectionMetrics before, after;
+};
+
+struct RecallOfSequence {
+  std::string name;
+  std::vector<RecallOfFrame> frames;
   DetectionMetrics before, after;
 };
 
@@ -81,69 +90,113 @@ CurvePlot PlotRecall(const std::string& title, const std::vector<RecallOfFrame>&
 }
 
 void PrintRow(const std::string& name, const DetectionMetrics& m) {
-  fmt::print("{:<24} {:>10} {:>14} {:>14}\n", name, fmt::format("{} of {}", m.frames_hit, m.frames),
+  fmt::print("{:<28} {:>10} {:>14} {:>14}\n", name, fmt::format("{} of {}", m.frames_hit, m.frames),
              fmt::format("{:.3f}", m.FrameRecall()), fmt::format("{:.3f}", m.Recall()));
 }
 
-void RunRecall(const RecallArguments& arguments, int* exit_code) {
-  const std::filesystem::path out = arguments.out;
-  PrepareOutputFolder(out);
-  std::string sequence = arguments.source;
-  if (!std::filesystem::is_directory(sequence)) {
-    SceneOptions scene = LoadScene(sequence.empty() ? "office" : sequence);
-    if (sequence.empty()) {  // as walking_rpy
-      scene.camera.motion = "rpy";
-      scene.frames = kPaperFrames;
-    }
-    if (const int frames = arguments.source_options.max_frames; frames > 0) scene.frames = frames;
-    sequence = (out / "sequence").string();
-    RenderScene(scene, sequence);
-  }
-  RunConsole console(arguments.quiet);
-  const ExperimentRun run = RunExperiment(arguments, sequence, &console);
-  if (console.ShouldStop()) {
-    *exit_code = kExitInterrupted;
-    return;
-  }
-  if (run.recall_before.frames == 0) {
-    throw InputError(sequence, "has no true box of a person or car in these images",
-                     "Give a scene, or a folder with boxes.csv as `simulate` writes it.");
-  }
-  const std::vector<RecallOfFrame> frames = RecallByFrame(run);
+nlohmann::ordered_json RowsOf(const RecallOfSequence& sequence) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const RecallOfFrame& frame : frames) {
-    rows.push_back({{"timestamp", frame.timestamp_s},
+  for (const RecallOfFrame& frame : sequence.frames) {
+    rows.push_back({{"sequence", sequence.name},
+                    {"timestamp", frame.timestamp_s},
                     {"true_boxes", frame.before.hits + frame.before.misses},
                     {"found_before", frame.before.hits},
                     {"found_after", frame.after.hits},
                     {"wrong_before", frame.before.false_alarms},
                     {"wrong_after", frame.after.false_alarms}});
   }
+  return rows;
+}
+
+// Nothing when it was interrupted.
+std::optional<RecallOfSequence> RunSequence(const RecallArguments& arguments, const std::string& name,
+                                            const std::string& folder, RunConsole* console) {
+  const ExperimentRun run = RunExperiment(arguments, folder, console);
+  if (console->ShouldStop()) return std::nullopt;
+  return RecallOfSequence{name, RecallByFrame(run), run.recall_before, run.recall_after};
+}
+
+// The folder that was named, or rendered scenes; nothing when it was interrupted.
+std::optional<std::vector<RecallOfSequence>> RunSequences(const RecallArguments& arguments,
+                                                          RunConsole* console) {
+  std::vector<RecallOfSequence> sequences;
+  const auto add = [&](const std::string& name, const std::string& folder) {
+    std::optional<RecallOfSequence> sequence = RunSequence(arguments, name, folder, console);
+    if (sequence.has_value()) sequences.push_back(std::move(*sequence));
+    return sequence.has_value();
+  };
+  if (std::filesystem::is_directory(arguments.source)) {
+    if (!add(arguments.source, arguments.source)) return std::nullopt;
+    return sequences;
+  }
+  SceneOptions scene = LoadScene(arguments.source.empty() ? "office" : arguments.source);
+  if (arguments.source.empty()) {  // as walking_rpy
+    scene.camera.motion = "rpy";
+    scene.frames = kPaperFrames;
+  }
+  if (const int frames = arguments.source_options.max_frames; frames > 0) scene.frames = frames;
+  const std::string folder = (std::filesystem::path(arguments.out) / "sequence").string();
+  for (int i = 0; i < arguments.seeds; ++i, ++scene.seed) {
+    RenderScene(scene, folder);
+    if (!add(fmt::format("seed {}", scene.seed), folder)) return std::nullopt;
+  }
+  return sequences;
+}
+
+void RunRecall(const RecallArguments& arguments, int* exit_code) {
+  const std::filesystem::path out = arguments.out;
+  PrepareOutputFolder(out);
+  RunConsole console(arguments.quiet);
+  const std::optional<std::vector<RecallOfSequence>> sequences = RunSequences(arguments, &console);
+  if (!sequences.has_value()) {
+    *exit_code = kExitInterrupted;
+    return;
+  }
+  DetectionMetrics all_before, all_after;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array(), parts = nlohmann::ordered_json::array();
+  for (const RecallOfSequence& sequence : *sequences) {
+    all_before += sequence.before;
+    all_after += sequence.after;
+    for (nlohmann::ordered_json& row : RowsOf(sequence)) rows.push_back(std::move(row));
+    parts.push_back({{"sequence", sequence.name},
+                     {"before", ToJson(sequence.before)},
+                     {"after", ToJson(sequence.after)}});
+  }
+  if (all_before.frames == 0) {
+    throw InputError(sequences->front().name, "has no true box of a person or car in these images",
+                     "Give a scene, or a folder with boxes.csv as `simulate` writes it.");
+  }
   const auto share = [](int part) { return static_cast<double>(part) / kPaperFrames; };
   WriteCsv(out / "recall.csv", rows);
-  WriteJson(out / "recall.json", {{"sequence", sequence},
-                                  {"detector", arguments.detector},
-                                  {"before", ToJson(run.recall_before)},
-                                  {"after", ToJson(run.recall_after)},
+  WriteJson(out / "recall.json", {{"detector", arguments.detector},
+                                  {"before", ToJson(all_before)},
+                                  {"after", ToJson(all_after)},
+                                  {"sequences", parts},
                                   {"paper",
                                    {{"sequence", "walking_rpy"},
                                     {"recall_per_frame_before", share(kPaperFoundBefore)},
                                     {"recall_per_frame_after", share(kPaperFoundAfter)}}}});
   const std::string title =
       fmt::format("Recall per frame: {:.1f}% before, {:.1f}% after compensation (the paper: 82.3%, 99.8%)",
-                  100 * run.recall_before.FrameRecall(), 100 * run.recall_after.FrameRecall());
-  const CurvePlot plot = PlotRecall(title, frames);
+                  100 * all_before.FrameRecall(), 100 * all_after.FrameRecall());
+  const CurvePlot plot = PlotRecall(title, sequences->front().frames);
   WritePicture((out / "recall.png").string(), DrawCurves(plot, 1100, 340));
   nlohmann::ordered_json before = {{"boxes", "of the detector"}}, after = {{"boxes", "after compensation"}};
-  before.update(ToJson(run.recall_before));
-  after.update(ToJson(run.recall_after));
+  before.update(ToJson(all_before));
+  after.update(ToJson(all_after));
   WriteBenchReport(out, "Recall of the detector", arguments, {before, after}, {plot});
-  fmt::print("\n{:<24} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
-  PrintRow("detector", run.recall_before);
-  PrintRow("after compensation", run.recall_after);
-  fmt::print("{:<24} {:>10} {:>14.3f}\n", "paper, SSD",
+  fmt::print("\n{:<28} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
+  if (sequences->size() > 1) {
+    for (const RecallOfSequence& sequence : *sequences) {
+      PrintRow(sequence.name + ", detector", sequence.before);
+      PrintRow(sequence.name + ", compensated", sequence.after);
+    }
+  }
+  PrintRow("detector", all_before);
+  PrintRow("after compensation", all_after);
+  fmt::print("{:<28} {:>10} {:>14.3f}\n", "paper, SSD",
              fmt::format("{} of {}", kPaperFoundBefore, kPaperFrames), share(kPaperFoundBefore));
-  fmt::print("{:<24} {:>10} {:>14.3f}\n", "paper, compensated",
+  fmt::print("{:<28} {:>10} {:>14.3f}\n", "paper, compensated",
              fmt::format("{} of {}", kPaperFoundAfter, kPaperFrames), share(kPaperFoundAfter));
   fmt::print("results: {}\n", arguments.out);
 }
@@ -157,10 +210,11 @@ void AddRecallCommand(CLI::App* bench, int* exit_code) {
   RecallArguments& a = *arguments;
   command->add_option("SOURCE", a.source,
                       "A scene, or a folder with images and boxes.csv; default: an office with motion rpy");
+  command->add_option("--seeds", a.seeds, "Scenes")->check(CLI::Range(1, 1000))->capture_default_str();
   command->add_option("--camera", a.camera, "As of run");
   a.detector = "builtin";
   a.out = "out/bench_recall";
-  AddRunOptions(command, "recall.csv, .json and .png", &a);
+  AddRunOptions(command, "recall.csv, .json and .png (first scene)", &a);
   AddSourceOptions(command, &a.source_options);
   command->footer(
       "Per frame, as the paper counts: at least one object was found, of the frames that show one.\n"

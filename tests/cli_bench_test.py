@@ -132,6 +132,16 @@ class CliBenchTest(unittest.TestCase):
         self.assertEqual([int(row[found]) > 0 for row in rows[1:]], [True, False] * 6)
         self.assert_is_picture(out, "recall.png")
 
+    def test_recall_is_that_of_all_scenes(self):
+        out, stdout = self.bench("recall", "office_walk", "--seeds", "2", "--max-frames", "6", "--detector",
+                                 "boxes:{source}/boxes.csv")
+        recall = json.loads(read(out, "recall.json"))
+        self.assertEqual([sequence["sequence"] for sequence in recall["sequences"]], ["seed 1", "seed 2"])
+        self.assertEqual(recall["after"]["frames"], sum(s["after"]["frames"] for s in recall["sequences"]))
+        self.assertEqual(recall["after"]["recall_per_frame"], 1)
+        self.assertEqual(len(read(out, "recall.csv").splitlines()), 13)
+        self.assertIn("seed 2, compensated", stdout)
+
     def test_recall_needs_true_boxes(self):
         result = run_program("bench", "recall", self.room, "--max-frames", "2", "--detector", "none", "--out",
                              os.path.join(self.shared, "none"))
