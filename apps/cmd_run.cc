@@ -164,7 +164,8 @@ std::optional<MetricScale> FindScale(const WantedScale& wanted, const SlamSystem
     if (const auto* distance = std::get_if<KnownDistance>(&wanted.source)) {
       scale = ScaleFromDistance(trajectory, *distance);
     } else if (const auto* height = std::get_if<KnownHeight>(&wanted.source)) {
-      scale = ScaleFromHeight(*system.map().Read(), system.Parts().front(), *height, system.options().seed);
+      const PartId part = system.Parts().front();  // before the map is held: it looks into it too
+      scale = ScaleFromHeight(*system.map().Read(), part, *height, system.options().seed);
     } else {
       scale = ScaleFromTrajectory(trajectory, wanted.metric,
                                   std::get<KnownTrajectory>(wanted.source).file.string());
