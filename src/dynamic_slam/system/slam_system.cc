@@ -41,9 +41,7 @@ const NoWork no_work;
 
 // The threads that OpenCV keeps for images serve the detector as well. Started by tracking, they would
 // inherit its priority, and keep it.
-void StartImageThreads() {
-  cv::parallel_for_(cv::Range(0, 4 * std::max(1, cv::getNumThreads())), no_work);
-}
+void StartImageThreads() { cv::parallel_for_(cv::Range(0, 4 * std::max(1, cv::getNumThreads())), no_work); }
 
 // In realtime mapping and the detector have a processor each.
 OrbOptions WithThreads(OrbOptions orb, RunMode mode) {
