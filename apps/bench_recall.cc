@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -108,27 +107,13 @@ nlohmann::ordered_json RowsOf(const RecallOfSequence& sequence) {
   return rows;
 }
 
-// Nothing when it was interrupted.
-std::optional<RecallOfSequence> RunSequence(const RecallArguments& arguments, const std::string& name,
-                                            const std::string& folder, RunConsole* console) {
-  const ExperimentRun run = RunExperiment(arguments, folder, console);
-  if (console->ShouldStop()) return std::nullopt;
-  return RecallOfSequence{name, RecallByFrame(run), run.recall_before, run.recall_after};
-}
-
-// The folder that was named, or rendered scenes; nothing when it was interrupted.
-std::optional<std::vector<RecallOfSequence>> RunSequences(const RecallArguments& arguments,
-                                                          RunConsole* console) {
-  std::vector<RecallOfSequence> sequences;
-  const auto add = [&](const std::string& name, const std::string& folder) {
-    std::optional<RecallOfSequence> sequence = RunSequence(arguments, name, folder, console);
-    if (sequence.has_value()) sequences.push_back(std::move(*sequence));
-    return sequence.has_value();
+// Of the folder that was named, or of rendered scenes; those until an interrupt.
+std::vector<RecallOfSequence> RunSequences(const RecallArguments& arguments, RunConsole* console) {
+  const auto run = [&](const std::string& name, const std::string& folder) {
+    const ExperimentRun run = RunExperiment(arguments, folder, console);
+    return RecallOfSequence{name, RecallByFrame(run), run.recall_before, run.recall_after};
   };
-  if (std::filesystem::is_directory(arguments.source)) {
-    if (!add(arguments.source, arguments.source)) return std::nullopt;
-    return sequences;
-  }
+  if (std::filesystem::is_directory(arguments.source)) return {run(arguments.source, arguments.source)};
   SceneOptions scene = LoadScene(arguments.source.empty() ? "office" : arguments.source);
   if (arguments.source.empty()) {  // as walking_rpy
     scene.camera.motion = "rpy";
@@ -136,9 +121,10 @@ std::optional<std::vector<RecallOfSequence>> RunSequences(const RecallArguments&
   }
   if (const int frames = arguments.source_options.max_frames; frames > 0) scene.frames = frames;
   const std::string folder = (std::filesystem::path(arguments.out) / "sequence").string();
-  for (int i = 0; i < arguments.seeds; ++i, ++scene.seed) {
+  std::vector<RecallOfSequence> sequences;
+  for (int i = 0; i < arguments.seeds && !console->ShouldStop(); ++i, ++scene.seed) {
     RenderScene(scene, folder);
-    if (!add(fmt::format("seed {}", scene.seed), folder)) return std::nullopt;
+    sequences.push_back(run(fmt::format("seed {}", scene.seed), folder));
   }
   return sequences;
 }
@@ -147,14 +133,14 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
   const std::filesystem::path out = arguments.out;
   PrepareOutputFolder(out);
   RunConsole console(arguments.quiet);
-  const std::optional<std::vector<RecallOfSequence>> sequences = RunSequences(arguments, &console);
-  if (!sequences.has_value()) {
+  const std::vector<RecallOfSequence> sequences = RunSequences(arguments, &console);
+  if (console.ShouldStop()) {
     *exit_code = kExitInterrupted;
     return;
   }
   DetectionMetrics all_before, all_after;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array(), parts = nlohmann::ordered_json::array();
-  for (const RecallOfSequence& sequence : *sequences) {
+  for (const RecallOfSequence& sequence : sequences) {
     all_before += sequence.before;
     all_after += sequence.after;
     for (nlohmann::ordered_json& row : RowsOf(sequence)) rows.push_back(std::move(row));
@@ -163,7 +149,7 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
                      {"after", ToJson(sequence.after)}});
   }
   if (all_before.frames == 0) {
-    throw InputError(sequences->front().name, "has no true box of a person or car in these images",
+    throw InputError(sequences.front().name, "has no true box of a person or car in these images",
                      "Give a scene, or a folder with boxes.csv as `simulate` writes it.");
   }
   const auto share = [](int part) { return static_cast<double>(part) / kPaperFrames; };
@@ -179,15 +165,15 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
   const std::string title =
       fmt::format("Recall per frame: {:.1f}% before, {:.1f}% after compensation (the paper: 82.3%, 99.8%)",
                   100 * all_before.FrameRecall(), 100 * all_after.FrameRecall());
-  const CurvePlot plot = PlotRecall(title, sequences->front().frames);
+  const CurvePlot plot = PlotRecall(title, sequences.front().frames);
   WritePicture((out / "recall.png").string(), DrawCurves(plot, 1100, 340));
   nlohmann::ordered_json before = {{"boxes", "of the detector"}}, after = {{"boxes", "after compensation"}};
   before.update(ToJson(all_before));
   after.update(ToJson(all_after));
   WriteBenchReport(out, "Recall of the detector", arguments, {before, after}, {plot});
   fmt::print("\n{:<28} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
-  if (sequences->size() > 1) {
-    for (const RecallOfSequence& sequence : *sequences) {
+  if (sequences.size() > 1) {
+    for (const RecallOfSequence& sequence : sequences) {
       PrintRow(sequence.name + ", detector", sequence.before);
       PrintRow(sequence.name + ", compensated", sequence.after);
     }

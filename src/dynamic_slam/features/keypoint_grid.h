@@ -50,10 +50,14 @@ class KeypointGrid {
   __attribute__((always_inline)) void ForEachAlong(const Eigen::Vector2f& a, const Eigen::Vector2f& b,
                                                    float radius_px, int min_octave, int max_octave,
                                                    Fn&& fn) const {
-    const float radius_squared = radius_px * radius_px;
     const Eigen::Vector2f along = b - a;
     const float length_squared = along.squaredNorm();
-    const float over = length_squared > 0 ? 1 / length_squared : 0;
+    if (length_squared == 0) {  // a window costs less
+      ForEachInWindow(a.x(), a.y(), radius_px, min_octave, max_octave, fn);
+      return;
+    }
+    const float radius_squared = radius_px * radius_px;
+    const float over = 1 / length_squared;
     const float reach_px = radius_px + 0.5f;  // more than the rounding of what follows
     ForEachInRows(
         std::min(a.y(), b.y()) - radius_px, std::max(a.y(), b.y()) + radius_px,

@@ -193,16 +193,11 @@ DS_DISPATCH_POPCNT
 int PastViews::View::Nearest(const Descriptor& descriptor, int octave, const Eigen::Vector2d& a,
                              const Eigen::Vector2d& b, double radius_px) const {
   int nearest = 257;
-  const auto compare = [&](uint32_t j) __attribute__((always_inline)) {
-    nearest = std::min(nearest, HammingDistance(descriptor, descriptors[j]));
-  };
-  const Eigen::Vector2f from = a.cast<float>(), to = b.cast<float>();
-  const auto radius = static_cast<float>(radius_px);
-  if (from == to) {
-    grid.ForEachInWindow(from.x(), from.y(), radius, octave - 1, octave + 1, compare);
-  } else {
-    grid.ForEachAlong(from, to, radius, octave - 1, octave + 1, compare);
-  }
+  grid.ForEachAlong(
+      a.cast<float>(), b.cast<float>(), static_cast<float>(radius_px), octave - 1,
+      octave + 1, [&](uint32_t j) __attribute__((always_inline)) {
+        nearest = std::min(nearest, HammingDistance(descriptor, descriptors[j]));
+      });
   return nearest;
 }
 
