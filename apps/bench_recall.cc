@@ -162,24 +162,30 @@ void RunRecall(const RecallArguments& arguments, int* exit_code) {
                                    {{"sequence", "walking_rpy"},
                                     {"recall_per_frame_before", share(kPaperFoundBefore)},
                                     {"recall_per_frame_after", share(kPaperFoundAfter)}}}});
-  const std::string title =
+  std::string title =
       fmt::format("Recall per frame: {:.1f}% before, {:.1f}% after compensation (the paper: 82.3%, 99.8%)",
                   100 * all_before.FrameRecall(), 100 * all_after.FrameRecall());
-  const CurvePlot plot = PlotRecall(title, sequences.front().frames);
-  WritePicture((out / "recall.png").string(), DrawCurves(plot, 1100, 340));
-  nlohmann::ordered_json before = {{"boxes", "of the detector"}}, after = {{"boxes", "after compensation"}};
-  before.update(ToJson(all_before));
-  after.update(ToJson(all_after));
-  WriteBenchReport(out, "Recall of the detector", arguments, {before, after}, {plot});
-  fmt::print("\n{:<28} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
+  std::vector<std::pair<std::string, DetectionMetrics>> table;
   if (sequences.size() > 1) {
+    title += fmt::format("; of {} scenes this is {}", sequences.size(), sequences.front().name);
     for (const RecallOfSequence& sequence : sequences) {
-      PrintRow(sequence.name + ", detector", sequence.before);
-      PrintRow(sequence.name + ", compensated", sequence.after);
+      table.emplace_back(sequence.name + ", detector", sequence.before);
+      table.emplace_back(sequence.name + ", compensated", sequence.after);
     }
   }
-  PrintRow("detector", all_before);
-  PrintRow("after compensation", all_after);
+  table.emplace_back("detector", all_before);
+  table.emplace_back("after compensation", all_after);
+  const CurvePlot plot = PlotRecall(title, sequences.front().frames);
+  WritePicture((out / "recall.png").string(), DrawCurves(plot, 1100, 340));
+  nlohmann::ordered_json results = nlohmann::ordered_json::array();
+  fmt::print("\n{:<28} {:>10} {:>14} {:>14}\n", "", "frames", "recall/frame", "recall/box");
+  for (const auto& [boxes, metrics] : table) {
+    nlohmann::ordered_json row = {{"boxes", boxes}};
+    row.update(ToJson(metrics));
+    results.push_back(std::move(row));
+    PrintRow(boxes, metrics);
+  }
+  WriteBenchReport(out, "Recall of the detector", arguments, results, {plot});
   fmt::print("{:<28} {:>10} {:>14.3f}\n", "paper, SSD",
              fmt::format("{} of {}", kPaperFoundBefore, kPaperFrames), share(kPaperFoundBefore));
   fmt::print("{:<28} {:>10} {:>14.3f}\n", "paper, compensated",
