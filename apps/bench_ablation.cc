@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -5,142 +9,238 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <fmt/core.h>
+#include <fmt/format.h>
 
-#include "bench_run.h"
+#include "bench_units.h"
 #include "cmd_bench.h"
+#include "dynamic_slam/base/error.h"
 #include "dynamic_slam/io/trajectory_file.h"
-#include "truth_report.h"
+#include "dynamic_slam/report/table.h"
+#include "dynamic_slam/report/truth_comparison.h"
+#include "experiment.h"
+#include "source_arguments.h"
 
 namespace dynamic_slam {
 namespace {
 
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
 struct Variant {
-  std::string name;
-  std::vector<std::string> assignments;
+  const char* name;
+  const char* assignment;  // "": none
 };
 
-const std::vector<Variant>& Variants() {
-  static const std::vector<Variant> variants{
-      {"none", {"dynamic.method=none"}},
-      {"hard boxes", {"dynamic.method=boxes"}},
-      {"paper", {"dynamic.method=paper"}},
-      {"default", {}},
-      {"- motion", {"dynamic.motion=false"}},
-      {"- past views", {"dynamic.past_views=false"}},
-      {"- landmark odds", {"dynamic.landmark_odds=false"}},
-      {"- more features", {"dynamic.more_features=false"}},
-      {"- shield", {"dynamic.shield_hidden=false"}},
-      {"- compensation", {"detector.compensation.method=none"}},
-      {"- loops", {"loop.enabled=false"}},
-  };
-  return variants;
-}
+constexpr Variant kVariants[] = {
+    {"none", "dynamic.method=none"},
+    {"hard boxes", "dynamic.method=boxes"},
+    {"paper", "dynamic.method=paper"},
+    {"default", ""},
+    {"- motion", "dynamic.motion=false"},
+    {"- past views", "dynamic.past_views=false"},
+    {"- landmark odds", "dynamic.landmark_odds=false"},
+    {"- more features", "dynamic.more_features=false"},
+    {"- shield", "dynamic.shield_hidden=false"},
+    {"- compensation", "detector.compensation.method=none"},
+    {"- loops", "loop.enabled=false"},
+};
 
-struct Outcome {
-  std::string source, variant;
-  double coverage = 0;
-  Trajectory trajectory;
-  std::optional<TruthComparison> truth;
-  double tracking_ms = 0;
+struct AblationArguments : BenchArguments {
+  int runs = 1, jobs = 1;
+};
+
+// One run, and what came of it.
+struct Run {
+  BenchUnit unit;
+  std::string variant;
+  int number = 1;
+  UnitOutcome outcome;
   std::optional<double> common_rmse_m;  // over the frames that all runs of the source that did not fail have
 
+  std::optional<double> Figure(const std::vector<std::string>& path) const {
+    return Median(FiguresAt({&outcome}, path));
+  }
+  double Coverage() const { return Figure({"coverage_live"}).value_or(0); }
+  std::optional<double> Rmse() const { return Figure({"frame_errors", "ape", "rmse"}); }
   bool Failed() const {
-    return coverage < kMinCoverage ||
-           (truth.has_value() && truth->ape.translation_m.rmse > kMaxErrorShare * truth->path_m);
+    return Coverage() < kMinCoverage ||
+           Rmse().value_or(0) > kMaxErrorShare * Figure({"frame_errors", "path_m"}).value_or(0);
   }
 };
 
-Outcome RunVariant(const BenchArguments& arguments, const std::string& source, const Variant& variant,
-                   RunConsole* console) {
-  const BenchRun run = RunForBench(arguments, source, variant.assignments, console);
-  Outcome outcome{source, variant.name, run.summary.Coverage(), run.system->FrameTrajectory(), {}, 0, {}};
-  outcome.tracking_ms = run.summary.tracking_ms.median;
-  if (run.record.truth.has_value() && outcome.trajectory.size() > 2) {
-    outcome.truth = CompareWithTruth(*run.record.truth, outcome.trajectory);
+// Folders of "- past views" and the like.
+std::string FolderName(std::string variant) {
+  if (variant.starts_with("- ")) variant.replace(0, 1, "without");
+  std::replace(variant.begin(), variant.end(), ' ', '_');
+  return variant;
+}
+
+std::vector<Run> MakeRuns(const AblationArguments& arguments) {
+  std::vector<Run> runs;
+  std::set<std::string> names;
+  for (const std::string& source : arguments.sources) {
+    const std::string name = ShortName(source);
+    OpenFrameSource(source, arguments.source_options);  // what is not there is told before the first run
+    if (!names.insert(name).second) {
+      throw InputError(source, "another SOURCE is called " + name + " too",
+                       "The results of each are in a folder of its name: rename one.");
+    }
+    for (const Variant& variant : kVariants) {
+      for (int number = 1; number <= arguments.runs; ++number) {
+        BenchUnit unit{.folder = fmt::format("{}/{}/{}", name, FolderName(variant.name), number),
+                       .title = fmt::format("{}: {}, run {}", name, variant.name, number),
+                       .source = source,
+                       .arguments = arguments};
+        // Poses of frames that had none when their turn came say nothing of tracking.
+        unit.arguments.assignments.push_back("backfill=false");
+        if (arguments.runs > 1) unit.arguments.assignments.push_back(fmt::format("seed={}", number));
+        if (*variant.assignment != 0) unit.arguments.assignments.push_back(variant.assignment);
+        runs.push_back({std::move(unit), variant.name, number, {}, {}});
+      }
+    }
   }
-  return outcome;
+  return runs;
 }
 
 // An error is only compared over the same frames.
-void CompareOverCommonFrames(const std::string& source, std::vector<Outcome>* outcomes) {
+void CompareOverCommonFrames(const fs::path& out, const std::string& source, std::vector<Run>* runs) {
   const std::optional<Trajectory> truth = LoadGroundTruth(source);
   if (!truth.has_value()) return;
-  std::optional<std::set<double>> common;
-  for (const Outcome& outcome : *outcomes) {
-    if (outcome.source != source || outcome.Failed()) continue;
+  struct Path {
+    Run* run;
+    Trajectory trajectory;
+  };
+  std::vector<Path> paths;
+  std::set<double> common;
+  for (Run& run : *runs) {
+    if (run.unit.source != source || run.Failed()) continue;
+    paths.push_back({&run, ReadTumTrajectory(out / run.unit.folder / "trajectory.txt")});
     std::set<double> stamps;
-    for (const StampedPose& pose : outcome.trajectory) {
-      if (!common.has_value() || common->contains(pose.timestamp_s)) stamps.insert(pose.timestamp_s);
+    for (const StampedPose& pose : paths.back().trajectory) {
+      if (paths.size() == 1 || common.contains(pose.timestamp_s)) stamps.insert(pose.timestamp_s);
     }
     common = std::move(stamps);
   }
-  if (!common.has_value() || common->size() < 10) return;
-  for (Outcome& outcome : *outcomes) {
-    if (outcome.source != source || outcome.Failed()) continue;
-    Trajectory part;
-    for (const StampedPose& pose : outcome.trajectory) {
-      if (common->contains(pose.timestamp_s)) part.push_back(pose);
-    }
-    outcome.common_rmse_m = CompareWithTruth(*truth, part).ape.translation_m.rmse;
+  if (common.size() < 10) return;
+  for (Path& path : paths) {
+    std::erase_if(path.trajectory,
+                  [&](const StampedPose& pose) { return !common.contains(pose.timestamp_s); });
+    path.run->common_rmse_m = CompareWithTruth(*truth, path.trajectory).ape.translation_m.rmse;
   }
 }
 
-void PrintOutcomes(const std::vector<Outcome>& outcomes) {
-  fmt::print("\n{:<28} {:<16} {:>9} {:>9} {:>13} {:>12}\n", "source", "variant", "coverage", "APE, m",
-             "in common, m", "tracking, ms");
-  for (const Outcome& outcome : outcomes) {
-    const std::string ape =
-        outcome.truth.has_value() ? fmt::format("{:.4f}", outcome.truth->ape.translation_m.rmse) : "-";
-    const std::string common = outcome.Failed() ? "failed"
-                               : outcome.common_rmse_m.has_value()
-                                   ? fmt::format("{:.4f}", *outcome.common_rmse_m)
-                                   : "-";
-    fmt::print("{:<28} {:<16} {:>9.3f} {:>9} {:>13} {:>12.1f}\n", ShortName(outcome.source), outcome.variant,
-               outcome.coverage, ape, common, outcome.tracking_ms);
-  }
-}
-
-nlohmann::ordered_json ToRows(const std::vector<Outcome>& outcomes) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const Outcome& outcome : outcomes) {
-    nlohmann::ordered_json row = {{"source", outcome.source},
-                                  {"variant", outcome.variant},
-                                  {"coverage", outcome.coverage},
-                                  {"ape_m", nullptr},
-                                  {"path_m", nullptr},
-                                  {"failed", outcome.Failed()},
-                                  {"common_ape_m", nullptr},
-                                  {"tracking_ms", outcome.tracking_ms}};
-    if (outcome.truth.has_value()) {
-      row["ape_m"] = outcome.truth->ape.translation_m.rmse;
-      row["path_m"] = outcome.truth->path_m;
-    }
-    if (outcome.common_rmse_m.has_value()) row["common_ape_m"] = *outcome.common_rmse_m;
-    rows.push_back(std::move(row));
+Json ToRows(const std::vector<Run>& runs) {
+  Json rows = Json::array();
+  for (const Run& run : runs) {
+    rows.push_back({{"source", run.unit.source},
+                    {"variant", run.variant},
+                    {"run", run.number},
+                    {"coverage", run.Coverage()},
+                    {"ape_m", OrNull(run.Rmse())},
+                    {"path_m", OrNull(run.Figure({"frame_errors", "path_m"}))},
+                    {"failed", run.Failed()},
+                    {"common_ape_m", OrNull(run.common_rmse_m)},
+                    {"tracking_ms", 1000 * run.Figure({"tracking_median_s"}).value_or(0)}});
   }
   return rows;
 }
 
-void RunAblation(const BenchArguments& arguments, int* exit_code) {
-  if (!arguments.out.empty()) PrepareOutputFolder(arguments.out);
-  std::vector<Outcome> outcomes;
-  RunConsole console(arguments.quiet);
-  for (const std::string& source : arguments.sources) {
-    for (const Variant& variant : Variants()) {
-      if (console.ShouldStop()) break;
-      if (!arguments.quiet) fmt::print(stderr, "{}: {}\n", source, variant.name);
-      Outcome outcome = RunVariant(arguments, source, variant, &console);
-      if (!console.ShouldStop()) outcomes.push_back(std::move(outcome));
+// "crowd" of "films/crowd21": films of one kind are counted together.
+std::string KindOf(const std::string& source) {
+  const std::string name = ShortName(source);
+  const size_t end = name.find_last_not_of("0123456789");
+  return end == std::string::npos ? name : name.substr(0, end + 1);
+}
+
+// One that failed is worse than any that did not.
+std::string MedianError(const std::vector<const Run*>& runs) {
+  std::vector<double> errors;
+  for (const Run* run : runs) {
+    if (run->Failed()) errors.push_back(std::numeric_limits<double>::infinity());
+    if (run->common_rmse_m.has_value()) errors.push_back(*run->common_rmse_m);
+  }
+  const std::optional<double> median = Median(errors);
+  if (!median.has_value()) return "-";
+  return std::isfinite(*median) ? fmt::format("{:.4f}", *median) : "failed";
+}
+
+Table MakeTable(const std::vector<Run>& runs) {
+  std::vector<std::string> kinds;
+  for (const Run& run : runs) {
+    const std::string kind = KindOf(run.unit.source);
+    if (std::count(kinds.begin(), kinds.end(), kind) == 0) kinds.push_back(kind);
+  }
+  Table table{
+      .title = "Ablation",
+      .note =
+          "A run failed that has a pose for less than half of the frames, or errs by more than 5% of the "
+          "path. Errors are over the frames that all other runs of a sequence have; medians.",
+      .columns = {{.name = "variant", .is_text = true},
+                  {.name = "failed"},
+                  {.name = "mean", .group = "coverage"},
+                  {.name = "least", .group = "coverage"},
+                  {.name = "all", .group = "APE in common, m"}},
+      .rows = {}};
+  if (kinds.size() > 1) {
+    for (const std::string& kind : kinds)
+      table.columns.push_back({.name = kind, .group = "APE in common, m"});
+  }
+  table.columns.push_back({.name = "worst", .group = "APE in common, m"});
+  for (const Variant& variant : kVariants) {
+    std::vector<const Run*> of_variant;
+    for (const Run& run : runs) {
+      if (run.variant == variant.name && run.outcome.figures.has_value()) of_variant.push_back(&run);
     }
-    CompareOverCommonFrames(source, &outcomes);
+    std::vector<double> coverages;
+    std::optional<double> worst;
+    size_t failed = 0;
+    for (const Run* run : of_variant) {
+      failed += run->Failed() ? 1 : 0;
+      coverages.push_back(run->Coverage());
+      if (run->common_rmse_m.has_value()) worst = std::max(worst.value_or(0), *run->common_rmse_m);
+    }
+    std::vector<std::string> cells = {
+        variant.name, fmt::format("{} of {}", failed, of_variant.size()), Percent(Mean(coverages), 1),
+        coverages.empty() ? "-" : Percent(*std::min_element(coverages.begin(), coverages.end()), 1),
+        MedianError(of_variant)};
+    if (kinds.size() > 1) {
+      for (const std::string& kind : kinds) {
+        std::vector<const Run*> of_kind = of_variant;
+        std::erase_if(of_kind, [&](const Run* run) { return KindOf(run->unit.source) != kind; });
+        cells.push_back(MedianError(of_kind));
+      }
+    }
+    cells.push_back(worst.has_value() ? fmt::format("{:.4f}", *worst) : "-");
+    table.rows.push_back(std::move(cells));
   }
-  PrintOutcomes(outcomes);
-  if (!arguments.out.empty()) {
-    WriteRows(arguments.out, "ablation", ToRows(outcomes));
-    WriteBenchReport(arguments.out, "Ablation", arguments, ToRows(outcomes), {});
-    fmt::print("results: {}\n", arguments.out);
+  return table;
+}
+
+void RunAblation(const AblationArguments& arguments, int* exit_code) {
+  const fs::path out = arguments.out;
+  std::vector<Run> runs = MakeRuns(arguments);
+  PrepareOutputFolder(out);
+  RunConsole console(arguments.quiet || arguments.jobs > 1);
+  std::vector<BenchUnit> units;
+  for (const Run& run : runs) units.push_back(run.unit);
+  const std::vector<UnitOutcome> outcomes = RunUnits(out, units, arguments.jobs, &console);
+  for (size_t i = 0; i < runs.size(); ++i) runs[i].outcome = outcomes[i];
+  for (const Run& run : runs) {
+    if (!run.outcome.failure.empty()) fmt::print("failed: {}: {}\n", run.unit.folder, run.outcome.failure);
   }
+  std::erase_if(runs, [](const Run& run) { return !run.outcome.figures.has_value(); });
+  for (const std::string& source : arguments.sources) CompareOverCommonFrames(out, source, &runs);
+  const Json rows = ToRows(runs);
+  WriteRows(out, "ablation_runs", rows);
+  const Table table = MakeTable(runs);
+  ReportPage page{
+      .title = table.title,
+      .subtitle = fmt::format("detector {} · version {}", arguments.detector, DYNAMIC_SLAM_VERSION),
+      .times_s = {}};
+  page.sections.push_back(TableSection(table));
+  if (!rows.empty()) page.sections.push_back(TableSection(TableOfRows("Runs", rows)));
+  WriteTables(out, {table}, page);
+  fmt::print("results: {}, report: {}\n", arguments.out, (out / "report.html").string());
   if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 
@@ -150,15 +250,23 @@ void AddAblationCommand(CLI::App* bench, int* exit_code) {
   CLI::App* command = bench->add_subcommand(
       "ablation",
       "What each part of the treatment of dynamic objects is worth: the same sequences without it");
-  const auto arguments = std::make_shared<BenchArguments>();
-  AddBenchOptions(command, "ablation.csv and ablation.json", arguments.get());
+  const auto arguments = std::make_shared<AblationArguments>();
+  AblationArguments& a = *arguments;
+  a.out = "out/bench_ablation";
+  AddBenchOptions(command, "tables.txt, .csv, .json, report.html, and below it the results of each run", &a);
   command->get_option("--detector")->required();
+  command->add_option("--runs", a.runs, "Runs of each, each with a seed of its own")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--jobs", a.jobs, "Runs at a time; times are then those of a busy machine")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
   command->footer(
-      "A run failed when it has a pose for less than half of the frames, or errs by more than 5% of the "
-      "path;\n"
-      "\"in common\" is the error over the frames that all other runs of the sequence have.\n"
+      "Films whose names differ in a number at their end only, as crowd21 and crowd22, are of one kind. What "
+      "is "
+      "done\nis not done again: after an interrupt the same command goes on.\n"
       "Example:\n"
-      "  dynamic_slam bench ablation walk cross --camera tum_fr1 --detector yolox_nano --out ablation");
+      "  dynamic_slam bench ablation walk cross21 cross22 --camera tum_fr1 --detector yolox_nano --runs 3");
   command->callback([arguments, exit_code] { RunAblation(*arguments, exit_code); });
 }
 

@@ -46,15 +46,28 @@ class CliBenchTest(unittest.TestCase):
         with open(boxes, "w", encoding="utf-8") as file:
             file.write("timestamp,class,score,x,y,w,h\n")
             file.writelines(f"{stamp},person,0.9,320,0,320,480\n" for stamp in stamps)
-        out, _ = self.bench("ablation", self.room, "--max-frames", "30", "--detector", "boxes:" + boxes)
-        rows = json.loads(read(out, "ablation.json"))
-        self.assertEqual([row["variant"] for row in rows][:4], ["none", "hard boxes", "paper", "default"])
+        arguments = [self.room, "--max-frames", "30", "--detector", "boxes:" + boxes, "--runs", "2", "--jobs", "2"]
+        out, text = self.bench("ablation", *arguments)
+        rows = json.loads(read(out, "ablation_runs.json"))
+        self.assertEqual([(row["variant"], row["run"]) for row in rows][:4],
+                         [("none", 1), ("none", 2), ("hard boxes", 1), ("hard boxes", 2)])
+        made_of = json.loads(read(out, "room", "none", "2", "figures.json"))["made_of"]
+        self.assertIn("\nseed: 2\n", made_of["options"])
         none = rows[0]
         self.assertGreater(none["coverage"], 0.7)
         self.assertFalse(none["failed"])
         for row in rows:
             self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.05 * row["path_m"])
             self.assertEqual(row["common_ape_m"] is None, row["failed"])
+        [none] = [row for row in json.loads(read(out, "tables.json"))[0]["rows"] if row["variant"] == "none"]
+        self.assertEqual(none["failed"], "0 of 2")
+        errors = [row["common_ape_m"] for row in rows if row["variant"] == "none"]
+        self.assertAlmostEqual(float(none["APE in common, m: all"]), sum(errors) / 2, delta=6e-5)
+        self.assertAlmostEqual(float(none["APE in common, m: worst"]), max(errors), delta=6e-5)
+        # What is done is not done again.
+        before = os.path.getmtime(os.path.join(out, "room", "paper", "1", "figures.json"))
+        self.bench("ablation", *arguments)
+        self.assertEqual(os.path.getmtime(os.path.join(out, "room", "paper", "1", "figures.json")), before)
 
     def test_boxes_of_another_sequence_are_told(self):
         boxes = os.path.join(self.shared, "others.csv")
