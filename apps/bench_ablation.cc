@@ -18,7 +18,6 @@
 #include "dynamic_slam/report/table.h"
 #include "dynamic_slam/report/truth_comparison.h"
 #include "experiment.h"
-#include "source_arguments.h"
 
 namespace dynamic_slam {
 namespace {
@@ -57,9 +56,7 @@ struct Run {
   UnitOutcome outcome;
   std::optional<double> common_rmse_m;  // over the frames that all runs of the source that did not fail have
 
-  std::optional<double> Figure(const std::vector<std::string>& path) const {
-    return Median(FiguresAt({&outcome}, path));
-  }
+  std::optional<double> Figure(const std::vector<std::string>& path) const { return FigureAt(outcome, path); }
   double Coverage() const { return Figure({"coverage_live"}).value_or(0); }
   std::optional<double> Rmse() const { return Figure({"frame_errors", "ape", "rmse"}); }
   bool Failed() const {
@@ -80,7 +77,7 @@ std::vector<Run> MakeRuns(const AblationArguments& arguments) {
   std::set<std::string> names;
   for (const std::string& source : arguments.sources) {
     const std::string name = ShortName(source);
-    OpenFrameSource(source, arguments.source_options);  // what is not there is told before the first run
+    CheckInputs(arguments, source);
     if (!names.insert(name).second) {
       throw InputError(source, "another SOURCE is called " + name + " too",
                        "The results of each are in a folder of its name: rename one.");
@@ -93,7 +90,7 @@ std::vector<Run> MakeRuns(const AblationArguments& arguments) {
                        .arguments = arguments};
         // Poses of frames that had none when their turn came say nothing of tracking.
         unit.arguments.assignments.push_back("backfill=false");
-        if (arguments.runs > 1) unit.arguments.assignments.push_back(fmt::format("seed={}", number));
+        unit.arguments.assignments.push_back(fmt::format("seed={}", number));
         if (*variant.assignment != 0) unit.arguments.assignments.push_back(variant.assignment);
         runs.push_back({std::move(unit), variant.name, number, {}, {}});
       }
@@ -152,6 +149,19 @@ std::string KindOf(const std::string& source) {
   return end == std::string::npos ? name : name.substr(0, end + 1);
 }
 
+std::vector<const Run*> OfVariant(const std::vector<Run>& runs, const Variant& variant) {
+  std::vector<const Run*> chosen;
+  for (const Run& run : runs) {
+    if (run.variant == variant.name) chosen.push_back(&run);
+  }
+  return chosen;
+}
+
+std::vector<const Run*> OfKind(std::vector<const Run*> runs, const std::string& kind) {
+  std::erase_if(runs, [&](const Run* run) { return KindOf(run->unit.source) != kind; });
+  return runs;
+}
+
 // One that failed is worse than any that did not.
 std::string MedianError(const std::vector<const Run*>& runs) {
   std::vector<double> errors;
@@ -170,46 +180,35 @@ Table MakeTable(const std::vector<Run>& runs) {
     const std::string kind = KindOf(run.unit.source);
     if (std::count(kinds.begin(), kinds.end(), kind) == 0) kinds.push_back(kind);
   }
-  Table table{
-      .title = "Ablation",
-      .note =
-          "A run failed that has a pose for less than half of the frames, or errs by more than 5% of the "
-          "path. Errors are over the frames that all other runs of a sequence have; medians.",
-      .columns = {{.name = "variant", .is_text = true},
-                  {.name = "failed"},
-                  {.name = "mean", .group = "coverage"},
-                  {.name = "least", .group = "coverage"},
-                  {.name = "all", .group = "APE in common, m"}},
-      .rows = {}};
-  if (kinds.size() > 1) {
-    for (const std::string& kind : kinds)
-      table.columns.push_back({.name = kind, .group = "APE in common, m"});
-  }
-  table.columns.push_back({.name = "worst", .group = "APE in common, m"});
+  if (kinds.size() == 1) kinds.clear();  // which is all
+  const std::string errors = "APE in common, m";
+  Table table{.title = "Ablation",
+              .note =
+                  "A run failed that has a pose for less than half of the frames, or errs by more than 5% "
+                  "of the path. Errors are over the frames that all other runs of a sequence have; medians.",
+              .columns = {{.name = "variant", .is_text = true},
+                          {.name = "failed"},
+                          {.name = "mean", .group = "coverage"},
+                          {.name = "least", .group = "coverage"},
+                          {.name = "all", .group = errors}},
+              .rows = {}};
+  for (const std::string& kind : kinds) table.columns.push_back({.name = kind, .group = errors});
+  table.columns.push_back({.name = "worst", .group = errors});
   for (const Variant& variant : kVariants) {
-    std::vector<const Run*> of_variant;
-    for (const Run& run : runs) {
-      if (run.variant == variant.name && run.outcome.figures.has_value()) of_variant.push_back(&run);
-    }
+    const std::vector<const Run*> of_variant = OfVariant(runs, variant);
+    if (of_variant.empty()) continue;
     std::vector<double> coverages;
     std::optional<double> worst;
     size_t failed = 0;
     for (const Run* run : of_variant) {
       failed += run->Failed() ? 1 : 0;
       coverages.push_back(run->Coverage());
-      if (run->common_rmse_m.has_value()) worst = std::max(worst.value_or(0), *run->common_rmse_m);
+      worst = std::max(worst, run->common_rmse_m);
     }
     std::vector<std::string> cells = {
         variant.name, fmt::format("{} of {}", failed, of_variant.size()), Percent(Mean(coverages), 1),
-        coverages.empty() ? "-" : Percent(*std::min_element(coverages.begin(), coverages.end()), 1),
-        MedianError(of_variant)};
-    if (kinds.size() > 1) {
-      for (const std::string& kind : kinds) {
-        std::vector<const Run*> of_kind = of_variant;
-        std::erase_if(of_kind, [&](const Run* run) { return KindOf(run->unit.source) != kind; });
-        cells.push_back(MedianError(of_kind));
-      }
-    }
+        Percent(*std::min_element(coverages.begin(), coverages.end()), 1), MedianError(of_variant)};
+    for (const std::string& kind : kinds) cells.push_back(MedianError(OfKind(of_variant, kind)));
     cells.push_back(worst.has_value() ? fmt::format("{:.4f}", *worst) : "-");
     table.rows.push_back(std::move(cells));
   }
@@ -225,9 +224,6 @@ void RunAblation(const AblationArguments& arguments, int* exit_code) {
   for (const Run& run : runs) units.push_back(run.unit);
   const std::vector<UnitOutcome> outcomes = RunUnits(out, units, arguments.jobs, &console);
   for (size_t i = 0; i < runs.size(); ++i) runs[i].outcome = outcomes[i];
-  for (const Run& run : runs) {
-    if (!run.outcome.failure.empty()) fmt::print("failed: {}: {}\n", run.unit.folder, run.outcome.failure);
-  }
   std::erase_if(runs, [](const Run& run) { return !run.outcome.figures.has_value(); });
   for (const std::string& source : arguments.sources) CompareOverCommonFrames(out, source, &runs);
   const Json rows = ToRows(runs);
@@ -238,9 +234,11 @@ void RunAblation(const AblationArguments& arguments, int* exit_code) {
       .subtitle = fmt::format("detector {} · version {}", arguments.detector, DYNAMIC_SLAM_VERSION),
       .times_s = {}};
   page.sections.push_back(TableSection(table));
-  if (!rows.empty()) page.sections.push_back(TableSection(TableOfRows("Runs", rows)));
+  std::vector<std::string> folders;
+  for (const Run& run : runs) folders.push_back(run.unit.folder);
+  if (!rows.empty()) page.sections.push_back(RunSection(TableOfRows("Runs", rows), folders));
   WriteTables(out, {table}, page);
-  fmt::print("results: {}, report: {}\n", arguments.out, (out / "report.html").string());
+  PrintEnd(out, units, outcomes);
   if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 
@@ -255,16 +253,11 @@ void AddAblationCommand(CLI::App* bench, int* exit_code) {
   a.out = "out/bench_ablation";
   AddBenchOptions(command, "tables.txt, .csv, .json, report.html, and below it the results of each run", &a);
   command->get_option("--detector")->required();
-  command->add_option("--runs", a.runs, "Runs of each, each with a seed of its own")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command->add_option("--jobs", a.jobs, "Runs at a time; times are then those of a busy machine")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  AddRunsOption(command, &a.runs);
+  AddJobsOption(command, &a.jobs);
   command->footer(
-      "Films whose names differ in a number at their end only, as crowd21 and crowd22, are of one kind. What "
-      "is "
-      "done\nis not done again: after an interrupt the same command goes on.\n"
+      "Films whose names differ in a number at their end only, as crowd21 and crowd22, are of one kind.\n"
+      "What is done is not done again: the same command goes on after an interrupt.\n"
       "Example:\n"
       "  dynamic_slam bench ablation walk cross21 cross22 --camera tum_fr1 --detector yolox_nano --runs 3");
   command->callback([arguments, exit_code] { RunAblation(*arguments, exit_code); });

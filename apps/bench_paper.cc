@@ -352,23 +352,12 @@ Table MakeRunTable(const std::vector<BenchUnit>& units, const std::vector<UnitOu
                           {.name = "failure", .is_text = true}},
               .rows = {}};
   for (size_t i = 0; i < units.size(); ++i) {
-    const std::vector<const UnitOutcome*> one = {&outcomes[i]};
     std::string failure = outcomes[i].failure;
     std::replace(failure.begin(), failure.end(), '\n', ' ');
-    table.rows.push_back({units[i].folder, Percent(Median(FiguresAt(one, {"coverage_live"})), 1),
-                          Number(Median(FiguresAt(one, {"frame_errors", "ape", "rmse"})), 1, 4), failure});
+    table.rows.push_back({units[i].folder, Percent(FigureAt(outcomes[i], {"coverage_live"}), 1),
+                          Number(FigureAt(outcomes[i], {"frame_errors", "ape", "rmse"}), 1, 4), failure});
   }
   return table;
-}
-
-// Each run's name leads to its report.
-nlohmann::ordered_json RunSection(const Table& table, const std::vector<UnitOutcome>& outcomes) {
-  nlohmann::ordered_json section = TableSection(table);
-  for (size_t i = 0; i < outcomes.size(); ++i) {
-    if (!outcomes[i].figures.has_value()) continue;
-    section["rows"][i][0] = {{"text", table.rows[i][0]}, {"href", table.rows[i][0] + "/report.html"}};
-  }
-  return section;
 }
 
 void RunPaper(const PaperArguments& arguments, int* exit_code) {
@@ -408,16 +397,16 @@ void RunPaper(const PaperArguments& arguments, int* exit_code) {
                   .times_s = {}};
   page.sections.push_back(ErrorBars(all, arguments));
   for (const Table& table : tables) page.sections.push_back(TableSection(table));
-  page.sections.push_back(RunSection(runs, outcomes));
+  std::vector<std::string> folders;
+  for (size_t i = 0; i < units.size(); ++i)
+    folders.push_back(outcomes[i].figures.has_value() ? units[i].folder : "");
+  page.sections.push_back(RunSection(runs, folders));
   std::string note =
       missing.empty() ? "" : fmt::format("Not there, and skipped: {}.", fmt::join(missing, ", "));
   page.sections.back()["note"] = note;
   tables.push_back(runs);
   WriteTables(out, tables, page);
-  for (size_t i = 0; i < units.size(); ++i) {
-    if (!outcomes[i].failure.empty()) fmt::print("failed: {}: {}\n", units[i].folder, outcomes[i].failure);
-  }
-  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
+  PrintEnd(out, units, outcomes);
   if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 
@@ -439,12 +428,8 @@ void AddPaperCommand(CLI::App* bench, int* exit_code, bool is_kitti) {
       ->add_option("--sequences", a.sequences,
                    "These only (default: the paper's; where none of them is there, all)")
       ->delimiter(',');
-  command->add_option("--runs", a.runs, "Runs of each, each with a seed of its own")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command->add_option("--jobs", a.jobs, "Runs at a time; times are those of a busy machine then")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  AddRunsOption(command, &a.runs);
+  AddJobsOption(command, &a.jobs);
   command->add_option("--camera", a.camera, "As of run (default: by the sequence's name)");
   AddRunOptions(command, "tables.txt, .csv, .json, report.html, and below it the results of each run", &a);
   AddSourceOptions(command, &a.source_options);

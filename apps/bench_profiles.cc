@@ -147,10 +147,7 @@ void RunProfiles(const ProfileArguments& arguments, int* exit_code) {
                    Bars(all, "Absolute pose error", "cm", "c2", {"frame_errors", "ape", "rmse"}, 100),
                    TableSection(table)};
   WriteTables(out, {table}, page);
-  for (size_t i = 0; i < units.size(); ++i) {
-    if (!outcomes[i].failure.empty()) fmt::print("failed: {}: {}\n", units[i].folder, outcomes[i].failure);
-  }
-  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
+  PrintEnd(out, units, outcomes);
   if (console.ShouldStop()) *exit_code = kExitInterrupted;
 }
 
@@ -170,9 +167,7 @@ void AddProfilesCommand(CLI::App* bench, int* exit_code) {
                    "Files, or names of " + ProfileHelp() + "; the first is what the others are compared with")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--runs", a.runs, "Runs of each, each with a seed of its own")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  AddRunsOption(command, &a.runs);
   command->add_option("--camera", a.camera, "As of run");
   AddRunOptions(command, "tables.txt, .csv, .json, report.html, and below it the results of each run", &a);
   AddSourceOptions(command, &a.source_options);

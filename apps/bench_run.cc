@@ -14,17 +14,6 @@
 #include "unmatched_inputs.h"
 
 namespace dynamic_slam {
-namespace {
-
-// `{source}` in the name of a detector stands for the source's folder, so that each may have its own boxes.
-std::string DetectorFor(std::string name, const std::string& source) {
-  const std::string key = "{source}";
-  const size_t at = name.find(key);
-  return at == std::string::npos ? name : name.replace(at, key.size(), source);
-}
-
-}  // namespace
-
 void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments* arguments) {
   BenchArguments& a = *arguments;
   command
@@ -52,6 +41,18 @@ void ApplyArguments(const BenchArguments& arguments, SystemOptions* options) {
   ApplySet(options, arguments.assignments);
 }
 
+std::string DetectorFor(const BenchArguments& arguments, const std::string& source) {
+  std::string name = arguments.detector;
+  const std::string key = "{source}";
+  const size_t at = name.find(key);
+  return at == std::string::npos ? name : name.replace(at, key.size(), source);
+}
+
+void CheckInputs(const BenchArguments& arguments, const std::string& source) {
+  ChooseCamera(arguments.camera, source, *OpenFrameSource(source, arguments.source_options));
+  MakeDetector(DetectorFor(arguments, source), arguments.models);
+}
+
 BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_name,
                      const std::vector<std::string>& assignments, RunConsole* console,
                      const std::function<void(const RunProgress&)>& on_frame) {
@@ -63,7 +64,7 @@ BenchRun RunForBench(const BenchArguments& arguments, const std::string& source_
   const Camera camera = ChooseCamera(arguments.camera, source_name, *source);
   run.system = std::make_unique<SlamSystem>(camera, options);
   RunRecorder recorder(source_name, camera, options.image);
-  const std::string detector = DetectorFor(arguments.detector, source_name);
+  const std::string detector = DetectorFor(arguments, source_name);
   run.system->SetDetector(recorder.Record(MakeDetector(detector, arguments.models)));
   UnmatchedInputs unmatched(detector, std::nullopt, *console);
   RunControl control = console->Control();

@@ -37,6 +37,13 @@ void AddBenchOptions(CLI::App* command, const std::string& results, BenchArgumen
 // its error says nothing.
 inline constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.05;
 
+// The arguments' detector for one source: `{source}` in its name stands for the source's folder, so that each
+// may have its own boxes.
+std::string DetectorFor(const BenchArguments& arguments, const std::string& source);
+
+// Throws InputError where the source, its camera or the detector is not there.
+void CheckInputs(const BenchArguments& arguments, const std::string& source);
+
 struct BenchRun {
   std::unique_ptr<SlamSystem> system;
   RunSummary summary;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <numeric>
 
+#include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include "dynamic_slam/base/error.h"
@@ -112,10 +113,9 @@ std::optional<Json> Done(const fs::path& file, const Json& made_of) {
   return known["figures"];
 }
 
-UnitOutcome RunUnit(const fs::path& out, const BenchUnit& unit, RunConsole* console) {
+UnitOutcome RunUnit(const fs::path& out, const BenchUnit& unit, const Json& made_of, RunConsole* console) {
   const fs::path folder = out / unit.folder;
   try {
-    const Json made_of = MadeOf(unit);
     if (std::optional<Json> figures = Done(folder / "figures.json", made_of)) {
       fmt::print(stderr, "{}: done before\n", unit.folder);
       return {std::move(figures), ""};
@@ -136,15 +136,29 @@ UnitOutcome RunUnit(const fs::path& out, const BenchUnit& unit, RunConsole* cons
 
 }  // namespace
 
+void AddRunsOption(CLI::App* command, int* runs) {
+  command->add_option("--runs", *runs, "Runs of each, each with a seed of its own")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+}
+
+void AddJobsOption(CLI::App* command, int* jobs) {
+  command->add_option("--jobs", *jobs, "Runs at a time; times are those of a busy machine then")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+}
+
 std::vector<UnitOutcome> RunUnits(const fs::path& out, const std::vector<BenchUnit>& units, int jobs,
                                   RunConsole* console) {
+  std::vector<Json> made_of;
+  for (const BenchUnit& unit : units) made_of.push_back(MadeOf(unit));
   std::vector<UnitOutcome> outcomes(units.size());
   Guarded<size_t> next(0);
   const auto work = [&] {
     while (!console->ShouldStop()) {
       const size_t unit = (*next.Write())++;
       if (unit >= units.size()) return;
-      outcomes[unit] = RunUnit(out, units[unit], console);
+      outcomes[unit] = RunUnit(out, units[unit], made_of[unit], console);
     }
   };
   if (jobs == 1) {
@@ -160,16 +174,38 @@ std::vector<UnitOutcome> RunUnits(const fs::path& out, const std::vector<BenchUn
   return outcomes;
 }
 
+void PrintEnd(const fs::path& out, const std::vector<BenchUnit>& units,
+              const std::vector<UnitOutcome>& outcomes) {
+  for (size_t i = 0; i < units.size(); ++i) {
+    if (!outcomes[i].failure.empty()) fmt::print("failed: {}: {}\n", units[i].folder, outcomes[i].failure);
+  }
+  fmt::print("results: {}, report: {}\n", out.string(), (out / "report.html").string());
+}
+
+Json RunSection(const Table& table, const std::vector<std::string>& folders) {
+  Json section = TableSection(table);
+  for (size_t i = 0; i < folders.size(); ++i) {
+    if (folders[i].empty()) continue;
+    section["rows"][i][0] = {{"text", table.rows[i][0]}, {"href", folders[i] + "/report.html"}};
+  }
+  return section;
+}
+
+std::optional<double> FigureAt(const UnitOutcome& outcome, const std::vector<std::string>& path) {
+  if (!outcome.figures.has_value()) return std::nullopt;
+  const Json* at = &*outcome.figures;
+  for (const std::string& key : path) {
+    at = at != nullptr && at->is_object() && at->contains(key) ? &(*at)[key] : nullptr;
+  }
+  if (at == nullptr || !at->is_number()) return std::nullopt;
+  return at->get<double>();
+}
+
 std::vector<double> FiguresAt(const std::vector<const UnitOutcome*>& outcomes,
                               const std::vector<std::string>& path) {
   std::vector<double> values;
   for (const UnitOutcome* outcome : outcomes) {
-    if (!outcome->figures.has_value()) continue;
-    const Json* at = &*outcome->figures;
-    for (const std::string& key : path) {
-      at = at != nullptr && at->is_object() && at->contains(key) ? &(*at)[key] : nullptr;
-    }
-    if (at != nullptr && at->is_number()) values.push_back(at->get<double>());
+    if (const std::optional<double> value = FigureAt(*outcome, path)) values.push_back(*value);
   }
   return values;
 }

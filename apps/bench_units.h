@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
 
 #include "bench_run.h"
@@ -26,13 +27,29 @@ struct UnitOutcome {
   std::string failure;
 };
 
+// How often each is run, and how many at a time.
+void AddRunsOption(CLI::App* command, int* runs);
+void AddJobsOption(CLI::App* command, int* jobs);
+
 // Runs the units, so many at a time, as far as they are not done already: figures.json in a unit's folder,
 // which is written last, holds what it was made of, and is as good as a run when that is the same. Each
-// folder gets the results of a run, with report.html. An interrupt ends it; what was done stays.
+// folder gets the results of a run, with report.html. An interrupt ends it; what was done stays. Throws
+// InputError for options that do not exist, before the first run; what fails later is an outcome.
 std::vector<UnitOutcome> RunUnits(const std::filesystem::path& out, const std::vector<BenchUnit>& units,
                                   int jobs, RunConsole* console);
 
-// The number at a path such as {"keyframe_errors", "ape", "rmse"} of the figures of each outcome that has it.
+// Names what failed, and where the results are.
+void PrintEnd(const std::filesystem::path& out, const std::vector<BenchUnit>& units,
+              const std::vector<UnitOutcome>& outcomes);
+
+// A table of runs for a page: the first cell of each row leads to the report in its folder, which is below
+// the page's. "": it has none.
+nlohmann::ordered_json RunSection(const Table& table, const std::vector<std::string>& folders);
+
+// The number at a path such as {"keyframe_errors", "ape", "rmse"} of the figures of an outcome.
+std::optional<double> FigureAt(const UnitOutcome& outcome, const std::vector<std::string>& path);
+
+// Of each outcome that has it.
 std::vector<double> FiguresAt(const std::vector<const UnitOutcome*>& outcomes,
                               const std::vector<std::string>& path);
 

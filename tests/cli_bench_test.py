@@ -47,7 +47,7 @@ class CliBenchTest(unittest.TestCase):
             file.write("timestamp,class,score,x,y,w,h\n")
             file.writelines(f"{stamp},person,0.9,320,0,320,480\n" for stamp in stamps)
         arguments = [self.room, "--max-frames", "30", "--detector", "boxes:" + boxes, "--runs", "2", "--jobs", "2"]
-        out, text = self.bench("ablation", *arguments)
+        out, _ = self.bench("ablation", *arguments)
         rows = json.loads(read(out, "ablation_runs.json"))
         self.assertEqual([(row["variant"], row["run"]) for row in rows][:4],
                          [("none", 1), ("none", 2), ("hard boxes", 1), ("hard boxes", 2)])
@@ -123,6 +123,16 @@ class CliBenchTest(unittest.TestCase):
             result = run_program("bench", experiment, os.path.join(self.shared, "nowhere"), "--detector", "none")
             self.assertEqual(result.returncode, 2, result.stdout)
             self.assertIn("nowhere", result.stderr)
+
+    def test_wrong_detectors_and_options_are_told_before_the_first_run(self):
+        for wrong, named in [(["--detector", "boxes:{source}/none.csv"], os.path.join(self.room, "none.csv")),
+                             (["--detector", "none", "--set", "nonsense=1"], "nonsense"),
+                             (["--detector", "none", "--camera", "nowhere.yaml"], "nowhere.yaml")]:
+            out = os.path.join(self.shared, "wrong")
+            result = run_program("bench", "ablation", self.room, *wrong, "--out", out)
+            self.assertEqual(result.returncode, 2, result.stdout)
+            self.assertIn(named, result.stderr)
+            self.assertFalse(os.path.exists(os.path.join(out, "room")))
 
     def test_recall_counts_before_and_after_compensation(self):
         # Every other image without an answer: half of the boxes are missed, and compensation brings most back.
