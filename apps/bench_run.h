@@ -33,10 +33,6 @@ void AddRunOptions(CLI::App* command, const std::string& results, BenchArguments
 // The same with the sequences.
 void AddBenchOptions(CLI::App* command, const std::string& results, BenchArguments* arguments);
 
-// A run that has a pose for less than half of the frames, or is wrong by more than 5% of the path, failed:
-// its error says nothing.
-inline constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.05;
-
 // The arguments' detector for one source: `{source}` in its name stands for the source's folder, so that each
 // may have its own boxes.
 std::string DetectorFor(const BenchArguments& arguments, const std::string& source);

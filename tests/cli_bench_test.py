@@ -57,7 +57,7 @@ class CliBenchTest(unittest.TestCase):
         self.assertGreater(none["coverage"], 0.7)
         self.assertFalse(none["failed"])
         for row in rows:
-            self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.05 * row["path_m"])
+            self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.01 * row["path_m"])
             self.assertEqual(row["common_ape_m"] is None, row["failed"])
         [none] = [row for row in json.loads(read(out, "tables.json"))[0]["rows"] if row["variant"] == "none"]
         self.assertEqual(none["failed"], "0 of 2")
