@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dynamic_slam/sim/car.h"
 #include "dynamic_slam/sim/person.h"
@@ -13,8 +14,12 @@ namespace {
 // A person who follows a path at a speed of his own.
 class Walker : public Actor {
  public:
-  Walker(uint64_t seed, int object, const PlanarPath& path, double start_m, double speed_m_per_s)
-      : person_(seed), object_(object), path_(path), start_m_(start_m), speed_m_per_s_(speed_m_per_s) {
+  Walker(Person person, int object, const PlanarPath& path, double start_m, double speed_m_per_s)
+      : person_(std::move(person)),
+        object_(object),
+        path_(path),
+        start_m_(start_m),
+        speed_m_per_s_(speed_m_per_s) {
     // Faster walkers take longer steps; 1.4 m, two steps, at 1.3 m/s.
     stride_m_ = 0.8 * person_.height_m() * std::sqrt(speed_m_per_s / 1.3);
   }
@@ -79,14 +84,14 @@ void AddDrivers(const SceneOptions& options, World& world, std::vector<std::uniq
 
 // Ways to and fro across the view, one behind the other, that end where the view does. Whoever comes back has
 // half a metre to those who go.
-std::vector<PlanarPath> WalksBefore(const World& world, int count) {
+std::vector<PlanarPath> WalksBefore(const World& world, const PeopleOptions& people) {
   const Eigen::Vector2d centre = world.camera_centre.head<2>();
   const Eigen::Vector2d ahead = (world.camera_target - world.camera_centre).head<2>().normalized();
   const Eigen::Vector2d left(-ahead.y(), ahead.x());
   std::vector<PlanarPath> walks;
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector2d middle = centre + (1.6 + 0.95 * i) * ahead;
-    const Eigen::Vector2d reach = 0.42 * (1.6 + 0.95 * i) * left;
+  for (int i = 0; i * people.per_row < people.count; ++i) {
+    const double distance_m = people.nearest_m + 0.95 * i;
+    const Eigen::Vector2d middle = centre + distance_m * ahead, reach = 0.42 * distance_m * left;
     walks.push_back(PlanarPath::ToAndFro(middle - reach, middle + reach, 0.5));
   }
   return walks;
@@ -109,7 +114,7 @@ std::vector<PlanarPath> WalksTowards(const World& world, int count) {
 
 std::vector<PlanarPath> WalksOf(const PeopleOptions& people, const World& world) {
   if (people.towards_camera) return WalksTowards(world, people.count);
-  if (people.near_camera) return WalksBefore(world, (people.count + 3) / 4);
+  if (people.near_camera) return WalksBefore(world, people);
   return world.walks;
 }
 
@@ -128,8 +133,9 @@ std::vector<std::unique_ptr<Actor>> MakeActors(const SceneOptions& options, Worl
         (options.people.count - 1 - i % static_cast<int>(walks.size())) / static_cast<int>(walks.size()) + 1;
     const double start_m = walk.length_m() * (own.Uniform() + static_cast<double>(on_path) / sharing);
     const double speed = options.people.speed_m_per_s * own.Uniform(0.8, 1.2);
-    actors.push_back(std::make_unique<Walker>(SubSeed(options.seed, 1000 + static_cast<uint64_t>(i)),
-                                              world.AddObject("person", true), walk, start_m, speed));
+    actors.push_back(std::make_unique<Walker>(
+        Person(SubSeed(options.seed, 1000 + static_cast<uint64_t>(i)), options.people.richness),
+        world.AddObject("person", true), walk, start_m, speed));
   }
   AddDrivers(options, world, &actors);
   return actors;

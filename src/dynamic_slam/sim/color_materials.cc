@@ -71,7 +71,7 @@ cv::Mat DrawGrain() {
   return image;
 }
 
-cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_front) {
+cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_front, double richness) {
   Random random(seed);
   cv::Mat image(side, side, CV_8UC3, color);
   const cv::Scalar second = AnyColor(random, 0.1, 1.0, 0.9);
@@ -135,9 +135,9 @@ cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_fr
   cv::GaussianBlur(relief, relief, {}, side / 170.0);
   cv::Mat colored;
   cv::merge(std::vector<cv::Mat>(3, relief), colored);
-  folded += colored;
+  folded += richness * colored;
   folded.convertTo(image, CV_8U);
-  AddOctaves(random, side / 8.0, 1, 6, image);
+  AddOctaves(random, side / 8.0, 1, 6 * richness, image);
   return image;
 }
 

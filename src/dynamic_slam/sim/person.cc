@@ -50,7 +50,7 @@ double Bump(double p, double centre, double width) {
 
 }  // namespace
 
-Person::Person(uint64_t seed) {
+Person::Person(uint64_t seed, double richness) {
   Random random(seed);
   const bool woman = random.Index(2) == 0;
   height_m_ = woman ? random.Uniform(1.56, 1.74) : random.Uniform(1.68, 1.92);
@@ -64,9 +64,9 @@ Person::Person(uint64_t seed) {
   const cv::Scalar shirt = AnyColor(random, 0.15, 1.0, 0.9), trousers = AnyColor(random, 0.12, 0.65, 0.6);
   const bool short_sleeves = random.Index(2) == 0, skirt = woman && random.Index(3) == 0;
   const bool long_hair = woman && random.Index(3) != 0, backpack = random.Index(4) == 0;
-  const Surface shirt_cloth = Covered(DrawCloth(SubSeed(seed, 1), 512, shirt));
-  const Surface sleeve_cloth = Covered(DrawCloth(SubSeed(seed, 1), 256, shirt, false), 2);
-  const Surface leg_cloth = Covered(DrawPlain(SubSeed(seed, 2), 256, trousers, 9), 2);
+  const Surface shirt_cloth = Covered(DrawCloth(SubSeed(seed, 1), 512, shirt, true, richness));
+  const Surface sleeve_cloth = Covered(DrawCloth(SubSeed(seed, 1), 256, shirt, false, richness), 2);
+  const Surface leg_cloth = Covered(DrawPlain(SubSeed(seed, 2), 256, trousers, 9 * richness), 2);
   const Surface bare = Covered(DrawPlain(SubSeed(seed, 3), 64, skin, 3), 1);
   const Surface hair_fibre = Covered(DrawPlain(SubSeed(seed, 4), 64, hair, 9), 1);
   const Surface shoe = Covered(DrawPlain(SubSeed(seed, 5), 64, AnyColor(random, 0.1, 0.9, 0.5), 10), 1);
@@ -82,8 +82,8 @@ Person::Person(uint64_t seed) {
                                      {{0, 0, -0.02}, 0.12 * b, 0.17 * b},
                                      {{0, 0, -0.25}, 0.17 * b, 0.21 * b},
                                      {{0, 0, -0.46}, 0.20 * b, 0.23 * b}};
-    pelvis.AddLoft(pelvis.AddSurface(Covered(DrawCloth(SubSeed(seed, 7), 256, trousers, false), 3)), rings,
-                   kX, kY, 14);
+    pelvis.AddLoft(pelvis.AddSurface(Covered(DrawCloth(SubSeed(seed, 7), 256, trousers, false, richness), 3)),
+                   rings, kX, kY, 14);
   } else {
     const std::vector<Ring> rings = {{{0, 0, 0.10}, 0.09 * b, 0.12 * b},
                                      {{0, 0, 0.0}, 0.115 * b, 0.165 * b},
@@ -107,7 +107,8 @@ Person::Person(uint64_t seed) {
   const std::vector<Ring> neck = {{{0.005, 0, 0.64}, 0.05, 0.052}, {{-0.005, 0, 0.52}, 0.058, 0.062}};
   torso.AddLoft(torso.AddSurface(bare), neck, kX, kY, 10);
   if (backpack) {
-    const Surface pack = Covered(DrawCloth(SubSeed(seed, 8), 256, AnyColor(random, 0.1, 0.9, 0.9), false), 2);
+    const Surface pack =
+        Covered(DrawCloth(SubSeed(seed, 8), 256, AnyColor(random, 0.1, 0.9, 0.9), false, richness), 2);
     torso.AddEllipsoid(torso.AddSurface(pack), {-0.17 * b, 0, 0.28}, {0.10, 0.15, 0.22}, 12, 9);
   }
 

@@ -21,7 +21,8 @@ struct WalkState {
 // hair and clothes follow from the seed.
 class Person {
  public:
-  explicit Person(uint64_t seed);
+  // richness: factor on the texture of the clothes.
+  explicit Person(uint64_t seed, double richness = 1);
 
   double height_m() const { return height_m_; }
 

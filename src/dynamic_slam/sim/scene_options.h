@@ -31,17 +31,23 @@ struct WorldOptions {
 struct PeopleOptions {
   int count = 2;
   bool near_camera = false;
+  double nearest_m = 1.6;
+  int per_row = 4;
   bool towards_camera = false;
   double speed_m_per_s = 1.1;
+  double richness = 1.0;
 
   template <class Self, class Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("count", self.count, OptionField{"", 0, 200, "People who walk."});
     visit("near_camera", self.near_camera,
-          OptionField{"", 0, 0, "They walk to and fro right before the camera, always in view."});
+          OptionField{"", 0, 0, "They walk to and fro right before the camera, in rows, always in view."});
+    visit("nearest_m", self.nearest_m, OptionField{"m", 0.5, 100, "How far away the first row is."});
+    visit("per_row", self.per_row, OptionField{"", 1, 200, "People in each row."});
     visit("towards_camera", self.towards_camera,
           OptionField{"", 0, 0, "They come towards the camera and go away again; before near_camera."});
     visit("speed_m_per_s", self.speed_m_per_s, OptionField{"m/s", 0, 3, "Mean speed; each has its own."});
+    visit("richness", self.richness, OptionField{"", 0, 3, "Contrast of folds and grain of their clothes."});
   }
 };
 

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -169,6 +171,36 @@ TEST(Simulation, TheCameraStandsStillDuringItsStopAndMovesSmoothly) {
   for (int i = 1; i + 1 < 400; ++i) {
     EXPECT_LT((position(i + 1) - 2 * position(i) + position(i - 1)).norm(), 0.004) << i;  // under 3.6 m/s^2
   }
+}
+
+// What the moving pixels of a frame show: the nearest depth in m, and the mean difference of neighbours.
+std::pair<float, double> People(const SceneOptions& options) {
+  const SimulatedFrame frame = Simulation(options).Frame(0);
+  float nearest_m = std::numeric_limits<float>::max();
+  double difference = 0;
+  int count = 0;
+  for (int y = 0; y < frame.image.rows; ++y) {
+    for (int x = 1; x < frame.image.cols; ++x) {
+      if (frame.moving(y, x) == 0 || frame.moving(y, x - 1) == 0) continue;
+      nearest_m = std::min(nearest_m, frame.depth_m(y, x));
+      difference += std::abs(frame.image.at<cv::Vec3b>(y, x)[1] - frame.image.at<cv::Vec3b>(y, x - 1)[1]);
+      ++count;
+    }
+  }
+  return {nearest_m, difference / std::max(count, 1)};
+}
+
+TEST(Simulation, PeopleBeforeTheCameraKeepTheirDistanceAndWearWhatIsAskedFor) {
+  SceneOptions options = Scene("crowd", 1);
+  options.people.nearest_m = 4;
+  options.people.richness = 1;
+  const auto [far_m, plain] = People(options);
+  EXPECT_GT(far_m, 3);  // half of a metre to those who come back, and arms that swing
+  EXPECT_LT(far_m, 5);
+  options.people.richness = 3;
+  EXPECT_GT(People(options).second, 1.3 * plain);
+  options.people.nearest_m = 2;
+  EXPECT_LT(People(options).first, 3);
 }
 
 std::string Bytes(const fs::path& path) {
