@@ -195,7 +195,7 @@ TEST(Simulation, PeopleBeforeTheCameraKeepTheirDistanceAndWearWhatIsAskedFor) {
   options.people.nearest_m = 4;
   options.people.richness = 1;
   const auto [far_m, plain] = People(options);
-  EXPECT_GT(far_m, 3);  // half of a metre to those who come back, and arms that swing
+  EXPECT_GT(far_m, 3);  // half a metre to those who come back, and arms that swing
   EXPECT_LT(far_m, 5);
   options.people.richness = 3;
   EXPECT_GT(People(options).second, 1.3 * plain);
