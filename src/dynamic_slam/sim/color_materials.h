@@ -46,8 +46,7 @@ cv::Mat DrawSky(uint64_t seed, int width, int height);  // u around, v from the 
 // On people.
 // With a pattern or plain; with_front: or with a print or an open jacket ahead, u = 0. richness: factor on
 // folds and grain.
-cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_front = true,
-                  double richness = 1);
+cv::Mat DrawCloth(uint64_t seed, int side, const cv::Scalar& color, bool with_front, double richness = 1);
 cv::Mat DrawFace(uint64_t seed, int side, const cv::Scalar& skin, const cv::Scalar& hair);  // around the head
 cv::Mat DrawPlain(uint64_t seed, int side, const cv::Scalar& color, double amplitude);
 

@@ -22,7 +22,7 @@ struct WalkState {
 class Person {
  public:
   // richness: factor on the texture of the clothes.
-  explicit Person(uint64_t seed, double richness = 1);
+  Person(uint64_t seed, double richness);
 
   double height_m() const { return height_m_; }
 

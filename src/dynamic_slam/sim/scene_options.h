@@ -43,7 +43,7 @@ struct PeopleOptions {
     visit("near_camera", self.near_camera,
           OptionField{"", 0, 0, "They walk to and fro right before the camera, in rows, always in view."});
     visit("nearest_m", self.nearest_m, OptionField{"m", 0.5, 100, "How far away the first row is."});
-    visit("per_row", self.per_row, OptionField{"", 1, 200, "People in each row."});
+    visit("per_row", self.per_row, OptionField{"", 1, 200, "People in a row at most."});
     visit("towards_camera", self.towards_camera,
           OptionField{"", 0, 0, "They come towards the camera and go away again; before near_camera."});
     visit("speed_m_per_s", self.speed_m_per_s, OptionField{"m/s", 0, 3, "Mean speed; each has its own."});

@@ -192,6 +192,7 @@ std::pair<float, double> People(const SceneOptions& options) {
 
 TEST(Simulation, PeopleBeforeTheCameraKeepTheirDistanceAndWearWhatIsAskedFor) {
   SceneOptions options = Scene("crowd", 1);
+  options.people.count = options.people.per_row;  // one row
   options.people.nearest_m = 4;
   options.people.richness = 1;
   const auto [far_m, plain] = People(options);
