@@ -44,15 +44,17 @@ size_t Medoid(const std::vector<const Descriptor*>& descriptors) {
   std::vector<uint16_t> distances;
   AllDistances(descriptors, &distances);
   size_t best = 0;
-  int best_median = std::numeric_limits<int>::max();
+  uint16_t best_median = std::numeric_limits<uint16_t>::max();
   for (size_t i = 0; i < count; ++i) {
     const auto row = distances.begin() + static_cast<std::ptrdiff_t>(i * count);
+    const auto end = row + static_cast<std::ptrdiff_t>(count);
+    // Few rows are better than the best so far, and to count is much quicker than to select.
+    const auto smaller = std::count_if(row, end, [best_median](uint16_t d) { return d < best_median; });
+    if (static_cast<size_t>(smaller) <= (count - 1) / 2) continue;
     const auto middle = row + static_cast<std::ptrdiff_t>((count - 1) / 2);
-    std::nth_element(row, middle, row + static_cast<std::ptrdiff_t>(count));
-    if (*middle < best_median) {
-      best_median = *middle;
-      best = i;
-    }
+    std::nth_element(row, middle, end);
+    best_median = *middle;
+    best = i;
   }
   return best;
 }
@@ -292,8 +294,8 @@ void Map::RefreshLandmark(LandmarkId id) {
   double information = 0;
   const Eigen::Vector3d mean = landmark.normal_.cast<double>();
   for (const Sight& sight : sights) {
-    information += sight.direction.cross(mean).squaredNorm() /
-                   std::max(std::pow(sight.direction.squaredNorm() * sight.scale, 2), 1e-24);
+    const double spread = sight.direction.squaredNorm() * sight.scale;
+    information += sight.direction.cross(mean).squaredNorm() / std::max(spread * spread, 1e-24);
   }
   landmark.spread_ = landmark.normal_ / static_cast<float>(std::sqrt(std::max(information, 1e-24)));
 
