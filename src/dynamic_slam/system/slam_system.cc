@@ -126,10 +126,7 @@ FrameResult SlamSystem::ProcessPrepared(double timestamp_s, const cv::Mat& image
 
   Remember(result);
   for (const KeyframeId keyframe : result.tracking.new_keyframes) {
-    executor_->Post(Lane::kMapping,
-                    [this, keyframe, epoch = result.tracking.map_epoch](const std::stop_token& token) {
-                      MapKeyframe(keyframe, epoch, token);
-                    });
+    PostMapping(keyframe, result.tracking.map_epoch);
   }
   PostLoops();
   result.keyframes_waiting = executor_->Waiting(Lane::kMapping);
@@ -183,6 +180,12 @@ void SlamSystem::Remember(const FrameResult& result) {
   } else {
     backfiller_->ForgetPosed();
   }
+}
+
+void SlamSystem::PostMapping(KeyframeId keyframe, uint32_t epoch) {
+  executor_->Post(Lane::kMapping, [this, keyframe, epoch](const std::stop_token& token) {
+    MapKeyframe(keyframe, epoch, token);
+  });
 }
 
 void SlamSystem::MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token) {
@@ -241,17 +244,29 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   if (is_stopped_) return {};
   ThrowIfFailed();
   DrainMapping();
-  const bool adjusts = options_.final_bundle && !options_.tracker.localise_only;
+  const bool changes_map = !options_.tracker.localise_only;
+  if (backfiller_.has_value() && options_.backfill_grows_map && changes_map) {
+    Backfill(true, should_stop);
+    DrainMapping();
+  }
+  const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
-  if (backfiller_.has_value()) Backfill(should_stop);
+  if (backfiller_.has_value()) Backfill(false, should_stop);
   return bundle;
 }
 
-void SlamSystem::Backfill(const std::function<bool()>& should_stop) {
+void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) {
   std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
   std::vector<AnchoredPose> known;
   for (const TrackedFrame& frame : all) known.push_back(frame.Pose());
-  for (const AnchoredPose& pose : backfiller_->Find(known, should_stop)) all.emplace_back(pose, false);
+  const uint32_t epoch = map_.Read()->epoch();
+  const auto map_keyframe = [this, epoch](KeyframeId keyframe) {
+    PostMapping(keyframe, epoch);
+    executor_->Drain(Lane::kMapping);
+  };
+  const std::vector<AnchoredPose> found =
+      grows ? backfiller_->Grow(known, map_keyframe, should_stop) : backfiller_->Find(known, should_stop);
+  for (const AnchoredPose& pose : found) all.emplace_back(pose, false);
   std::stable_sort(all.begin(), all.end(), [](const TrackedFrame& a, const TrackedFrame& b) {
     return a.timestamp_s < b.timestamp_s;
   });
@@ -366,6 +381,9 @@ Trajectory SlamSystem::KeyframeTrajectory(PartId part) const {
     if (keyframe.part() != part || !keyframe.frame_id().IsValid()) return;
     trajectory.push_back({keyframe.timestamp_s(), keyframe.cam_from_world().Inverse()});
   });
+  // Some may have become keyframes after later ones.
+  std::sort(trajectory.begin(), trajectory.end(),
+            [](const StampedPose& a, const StampedPose& b) { return a.timestamp_s < b.timestamp_s; });
   return trajectory;
 }
 

@@ -151,7 +151,9 @@ class SlamSystem {
                               std::chrono::steady_clock::time_point start);
   void ThrowIfFailed() const;
   void Remember(const FrameResult& result);
-  void Backfill(const std::function<bool()>& should_stop);
+  // Looks for poses of frames that have none; grows: and lets the map grow by them.
+  void Backfill(bool grows, const std::function<bool()>& should_stop);
+  void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops
   // Looks for loops at the keyframes that local mapping has done since the last call.

@@ -17,6 +17,7 @@ struct SystemOptions {
   uint64_t seed = 1;
   bool final_bundle = true;
   bool backfill = true;
+  bool backfill_grows_map = true;
   ImageOptions image;
   DetectionOptions detector;
   OrbOptions orb;
@@ -36,6 +37,10 @@ struct SystemOptions {
               "", 0, 1,
               "Offline: frames that had no pose when their turn came get one in the finished map, where "
               "they fit it."});
+    visit("backfill_grows_map", self.backfill_grows_map,
+          OptionField{"", 0, 1,
+                      "Before the map is finished it grows by such frames, where they show what it does not "
+                      "have."});
     visit("image", self.image);
     visit("detector", self.detector);
     visit("dynamic", self.dynamic);

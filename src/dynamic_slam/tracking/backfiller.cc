@@ -4,8 +4,10 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <set>
 
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/tracking/keyframe_policy.h"
 
 namespace dynamic_slam {
 namespace {
@@ -51,8 +53,14 @@ Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint
       random_(seed) {}
 
 void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
-  kept_.push_back(
-      {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
+  kept_.push_back({frame.id,
+                   frame.timestamp_s,
+                   frame.features,
+                   frame.static_probability,
+                   min_inliers,
+                   has_pose,
+                   false,
+                   {}});
   // As they were read: the motion that was expected then is not that of the pose.
   std::vector<Keypoint>& keypoints = kept_.back().features.keypoints;
   for (size_t i = 0; i < frame.read_px.size(); ++i)
@@ -78,7 +86,6 @@ void Backfiller::PartWasErased() {
 void Backfiller::Clear() {
   kept_.clear();
   keypoints_ = 0;
-  random_ = Random(seed_);
 }
 
 std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
@@ -87,10 +94,38 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
   Known poses;
   for (const AnchoredPose& pose : known) poses.emplace(pose.timestamp_s, pose);
   LearnMotion(poses);
+  random_ = Random(seed_);
+  for (KeptFrame& kept : kept_) kept.tried_between.reset();  // in another map
   std::vector<AnchoredPose> found;
   if (Spread(should_stop, &poses, &found) && Recognise(should_stop, &poses, &found))
     Spread(should_stop, &poses, &found);
   return found;
+}
+
+std::vector<AnchoredPose> Backfiller::Grow(std::span<const AnchoredPose> known,
+                                           const MapKeyframe& map_keyframe,
+                                           const std::function<bool()>& should_stop) {
+  LeaveOut(Find(known, should_stop));
+  map_keyframe_ = map_keyframe;
+  chain_ = {};
+  std::vector<AnchoredPose> found = Find(known, should_stop);
+  map_keyframe_ = nullptr;
+  for (KeptFrame& kept : kept_) kept.is_left_out = false;
+  return found;
+}
+
+void Backfiller::LeaveOut(const std::vector<AnchoredPose>& found) {
+  std::set<double> stamps;
+  for (const AnchoredPose& pose : found) stamps.insert(pose.timestamp_s);
+  for (size_t first = 0, last = 0; first < kept_.size(); first = last) {
+    int missing = 0, most_missing = 0;
+    for (last = first; last < kept_.size(); ++last) {
+      if (last > first && kept_[last].id.value() != kept_[last - 1].id.value() + 1) break;
+      missing = stamps.contains(kept_[last].timestamp_s) ? 0 : missing + 1;
+      most_missing = std::max(most_missing, missing);
+    }
+    for (size_t i = first; i < last; ++i) kept_[i].is_left_out = most_missing <= kMaxGapFrames;
+  }
 }
 
 bool Backfiller::Spread(const std::function<bool()>& should_stop, Known* known,
@@ -100,7 +135,7 @@ bool Backfiller::Spread(const std::function<bool()>& should_stop, Known* known,
     if (is_forward) goes_on = false;
     for (size_t i = 0; i < kept_.size(); ++i) {
       KeptFrame& kept = kept_[is_forward ? i : kept_.size() - 1 - i];
-      if (known->contains(kept.timestamp_s)) continue;
+      if (kept.is_left_out || known->contains(kept.timestamp_s)) continue;
       if (should_stop && should_stop()) return false;
       const std::optional<AnchoredPose> pose = FindFromNeighbours(*known, &kept);
       if (!pose.has_value()) continue;
@@ -118,7 +153,7 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* know
   Known with_recognised = *known;
   bool goes_on = true;
   for (const KeptFrame& kept : kept_) {
-    if (known->contains(kept.timestamp_s)) continue;
+    if (kept.is_left_out || known->contains(kept.timestamp_s)) continue;
     goes_on = !should_stop || !should_stop();
     if (!goes_on) break;
     Frame frame = FrameOf(kept);
@@ -197,13 +232,35 @@ std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const Known& known, K
                                &frame) < options_.min_motion_inliers)
         continue;
       CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
-      localiser_.TrackLocalMap(options_.local_map_radius_px, &frame);
+      const int inliers = localiser_.TrackLocalMap(options_.local_map_radius_px, &frame);
       if (localiser_.pose_tracker().RightInliers() < kept->min_inliers) continue;
-      const std::optional<AnchoredPose> pose = PlausiblePose(known, &frame);
-      if (pose.has_value()) return pose;
+      if (!PlausiblePose(known, &frame).has_value()) continue;
+      if (map_keyframe_) GrowBy(inliers, &frame);
+      return AnchoredPose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
     }
   }
   return std::nullopt;
+}
+
+void Backfiller::GrowBy(int inliers, Frame* frame) {
+  const int64_t number = frame->id.value();
+  const bool goes_on = std::abs(number - chain_.last) == 1;
+  chain_.last = number;
+  chain_.most_inliers = std::max(chain_.most_inliers, inliers);
+  KeyframePolicyInput input;
+  input.frames_since_keyframe = static_cast<int>(std::abs(number - chain_.keyframe));
+  input.inliers = inliers;
+  input.most_inliers = chain_.most_inliers;
+  // The first one stands where tracking was lost for want of landmarks.
+  if (goes_on && DecideKeyframe(input, options_.keyframe) == KeyframeReason::kNone) return;
+  {
+    const auto map = map_->Write();
+    frame->reference = InsertKeyframe(*frame, map.get(), map->PartOf(frame->reference));
+  }
+  frame->cam_from_reference = Rigid3();
+  frame->reference_unit = 1;
+  chain_ = {number, number, inliers};
+  map_keyframe_(frame->reference);
 }
 
 std::vector<Backfiller::Guess> Backfiller::Guesses(const Known& known, double timestamp_s) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
@@ -17,10 +18,11 @@
 
 namespace dynamic_slam {
 
-// Gives frames that had no pose when their turn came one in the finished map, which knows more: from where
-// the frames before and after them are, or else, where two in a row agree, from what they look like. A pose
-// needs as many inliers as it did then, so near that they are no chance, and must be one to which the camera
-// can have moved from those before and after it.
+// Gives frames that had no pose when their turn came one in the whole map, which knows more: from where the
+// frames before and after them are, or else, where two in a row agree, from what they look like. A pose needs
+// as many inliers as it did then, so near that they are no chance, and must be one to which the camera can
+// have moved from those before and after it. Where frames show what the map does not have, it can grow by
+// them, also against the order of time.
 class Backfiller {
  public:
   Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);
@@ -39,6 +41,12 @@ class Backfiller {
   std::vector<AnchoredPose> Find(std::span<const AnchoredPose> known,
                                  const std::function<bool()>& should_stop);
 
+  // The same, and those of them become keyframes that would have done so in tracking. map_keyframe: what
+  // local mapping does with one that is in the map, its landmarks linked.
+  using MapKeyframe = std::function<void(KeyframeId)>;
+  std::vector<AnchoredPose> Grow(std::span<const AnchoredPose> known, const MapKeyframe& map_keyframe,
+                                 const std::function<bool()>& should_stop);
+
   void Clear();
 
  private:
@@ -49,6 +57,7 @@ class Backfiller {
     std::vector<float> static_probability;
     int min_inliers = 0;
     bool has_pose = false;
+    bool is_left_out = false;                                // for now
     std::optional<std::pair<double, double>> tried_between;  // stamps of the poses before and after it, s
   };
   using Known = std::map<double, AnchoredPose>;  // by stamp
@@ -57,6 +66,13 @@ class Backfiller {
   struct Guess {
     KeyframeId keyframe;
     Rigid3 cam_from_world;
+  };
+
+  // Frames in a row, forwards or backwards, by which the map grows: numbers of frames, and the most inliers
+  // since the keyframe.
+  struct Chain {
+    int64_t keyframe = -2, last = -2;
+    int most_inliers = 0;
   };
 
   // How fast the camera was, and how often there are frames.
@@ -75,7 +91,12 @@ class Backfiller {
   // found by chance, or on somebody who was there before.
   bool Recognise(const std::function<bool()>& should_stop, Known* known, std::vector<AnchoredPose>* found);
   std::optional<AnchoredPose> FindFromNeighbours(const Known& known, KeptFrame* kept);
+  // Frames in a row of which no more are missing in these than are bridged anyhow: the map has what they
+  // show.
+  void LeaveOut(const std::vector<AnchoredPose>& found);
   Frame FrameOf(const KeptFrame& kept);
+  // Makes the frame, which is anchored, a keyframe where that is due.
+  void GrowBy(int inliers, Frame* frame);
   // Anchors the frame at the pose that the localiser found; none if that cannot be.
   std::optional<AnchoredPose> PlausiblePose(const Known& known, Frame* frame);
   std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
@@ -94,6 +115,8 @@ class Backfiller {
   size_t keypoints_ = 0;        // of all of them
   double interval_s_ = 0, max_gap_s_ = 0;
   std::map<PartId, double> max_speed_;  // map units per s
+  MapKeyframe map_keyframe_;            // empty: the map stays as it is
+  Chain chain_;
 };
 
 }  // namespace dynamic_slam

@@ -1,5 +1,6 @@
 #include "dynamic_slam/tracking/backfiller.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -122,6 +123,61 @@ TEST_F(BackfillerTest, MatchesThatLieAnywhereWithinTheLimitAreNoPose) {
   const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].timestamp_s, 0.5);
+}
+
+// The camera comes from where the map has nothing.
+class GrowingBackfillerTest : public BackfillerTest {
+ protected:
+  static constexpr int kFrames = 60;
+
+  GrowingBackfillerTest() {
+    std::vector<LandmarkId> unknown;
+    scene_.map.landmarks().ForEach([&](const Landmark& landmark) {
+      if (landmark.position().x() < 0.5) unknown.push_back(landmark.id());
+    });
+    for (const LandmarkId id : unknown) scene_.map.EraseLandmark(id);
+    for (int i = kFrames; i > 0; --i) backfiller_.Keep(FrameAt(-0.05 * i), kMinInliers, false);
+  }
+
+  // Landmarks of what the keyframe and the one before it show.
+  void Map(KeyframeId id) {
+    scene_.views.push_back(world_.See(SidewaysPose(scene_.map.keyframes().At(id).timestamp_s())));
+    for (uint32_t point = 0; point < world_.size(); ++point) {
+      std::vector<KeyframeId> free;
+      for (const KeyframeId keyframe : {keyframes_.back(), id}) {
+        const std::vector<uint32_t>& points = scene_.views[keyframe.value()].points;
+        const auto found = std::find(points.begin(), points.end(), point);
+        if (found == points.end()) continue;
+        const auto keypoint = static_cast<size_t>(found - points.begin());
+        if (!scene_.map.keyframes().At(keyframe).landmarks()[keypoint].IsValid()) free.push_back(keyframe);
+      }
+      if (free.size() == 2) scene_.AddLandmark(point, free);
+    }
+    keyframes_.push_back(id);
+  }
+};
+
+TEST_F(GrowingBackfillerTest, TheMapGrowsAgainstTheOrderOfTime) {
+  keyframes_ = {keyframes_[0]};
+  const size_t without = backfiller_.Find(known_, {}).size();
+  const std::vector<AnchoredPose> found = backfiller_.Grow(known_, [this](KeyframeId id) { Map(id); }, {});
+  EXPECT_LT(without, size_t{kFrames - 10});
+  EXPECT_EQ(found.size(), size_t{kFrames});
+  for (const AnchoredPose& pose : found) {
+    EXPECT_LT((CentreOf(pose) - Eigen::Vector3d(pose.timestamp_s, 0, 0)).norm(), 0.05) << pose.timestamp_s;
+  }
+  EXPECT_GT(keyframes_.size(), 3u);
+  EXPECT_LT(keyframes_.size(), 30u) << "not every frame";
+  EXPECT_THAT(scene_.map.Validate(), IsEmpty());
+}
+
+TEST_F(BackfillerTest, WhatTheMapHasDoesNotGrowIt) {
+  for (const double t : {0.4, 0.45, 0.5, 0.55, 0.6}) backfiller_.Keep(FrameAt(t), kMinInliers, false);
+  int mapped = 0;
+  EXPECT_THAT(backfiller_.Grow(known_, [&mapped](KeyframeId) { ++mapped; }, {}), IsEmpty());
+  EXPECT_EQ(mapped, 0);
+  EXPECT_EQ(scene_.map.keyframes().size(), 3u);
+  EXPECT_EQ(backfiller_.Find(known_, {}).size(), 5u) << "they are still looked for";
 }
 
 TEST_F(BackfillerTest, NobodyIsFasterThanTheCameraEverWas) {
