@@ -172,7 +172,7 @@ class SlamSystem {
   Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
   FileBackedVector<TrackedFrame> tracked_;  // in the order of time
-  std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
+  std::optional<Backfiller> backfiller_;    // offline, unless it is turned off
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work
   cv::Mat colour_;              // that of the last question to the detector; free once that is answered

@@ -86,6 +86,7 @@ void Backfiller::PartWasErased() {
 void Backfiller::Clear() {
   kept_.clear();
   keypoints_ = 0;
+  map_keyframe_ = nullptr;
 }
 
 std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
@@ -105,7 +106,7 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
 std::vector<AnchoredPose> Backfiller::Grow(std::span<const AnchoredPose> known,
                                            const MapKeyframe& map_keyframe,
                                            const std::function<bool()>& should_stop) {
-  LeaveOut(Find(known, should_stop));
+  LeaveOut(known, Find(known, should_stop));
   map_keyframe_ = map_keyframe;
   chain_ = {};
   std::vector<AnchoredPose> found = Find(known, should_stop);
@@ -114,8 +115,9 @@ std::vector<AnchoredPose> Backfiller::Grow(std::span<const AnchoredPose> known,
   return found;
 }
 
-void Backfiller::LeaveOut(const std::vector<AnchoredPose>& found) {
+void Backfiller::LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found) {
   std::set<double> stamps;
+  for (const AnchoredPose& pose : known) stamps.insert(pose.timestamp_s);
   for (const AnchoredPose& pose : found) stamps.insert(pose.timestamp_s);
   for (size_t first = 0, last = 0; first < kept_.size(); first = last) {
     int missing = 0, most_missing = 0;

@@ -41,8 +41,9 @@ class Backfiller {
   std::vector<AnchoredPose> Find(std::span<const AnchoredPose> known,
                                  const std::function<bool()>& should_stop);
 
-  // The same, and those of them become keyframes that would have done so in tracking. map_keyframe: what
-  // local mapping does with one that is in the map, its landmarks linked.
+  // The same for frames that are in a row with many that Find does not find: those of them become keyframes
+  // that would have done so in tracking. map_keyframe: what local mapping does with one that is in the map,
+  // its landmarks linked.
   using MapKeyframe = std::function<void(KeyframeId)>;
   std::vector<AnchoredPose> Grow(std::span<const AnchoredPose> known, const MapKeyframe& map_keyframe,
                                  const std::function<bool()>& should_stop);
@@ -93,7 +94,7 @@ class Backfiller {
   std::optional<AnchoredPose> FindFromNeighbours(const Known& known, KeptFrame* kept);
   // Frames in a row of which no more are missing in these than are bridged anyhow: the map has what they
   // show.
-  void LeaveOut(const std::vector<AnchoredPose>& found);
+  void LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found);
   Frame FrameOf(const KeptFrame& kept);
   // Makes the frame, which is anchored, a keyframe where that is due.
   void GrowBy(int inliers, Frame* frame);
