@@ -49,18 +49,11 @@ Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint
       map_(map),
       shutter_(camera),
       localiser_(camera, options, map->Read()->octave_scales(), map),
-      seed_(seed),
-      random_(seed) {}
+      seed_(seed) {}
 
 void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
-  kept_.push_back({frame.id,
-                   frame.timestamp_s,
-                   frame.features,
-                   frame.static_probability,
-                   min_inliers,
-                   has_pose,
-                   false,
-                   {}});
+  kept_.push_back(
+      {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
   // As they were read: the motion that was expected then is not that of the pose.
   std::vector<Keypoint>& keypoints = kept_.back().features.keypoints;
   for (size_t i = 0; i < frame.read_px.size(); ++i)
@@ -95,7 +88,6 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
   Known poses;
   for (const AnchoredPose& pose : known) poses.emplace(pose.timestamp_s, pose);
   LearnMotion(poses);
-  random_ = Random(seed_);
   for (KeptFrame& kept : kept_) kept.tried_between.reset();  // in another map
   std::vector<AnchoredPose> found;
   if (Spread(should_stop, &poses, &found) && Recognise(should_stop, &poses, &found))
@@ -152,6 +144,7 @@ bool Backfiller::Spread(const std::function<bool()>& should_stop, Known* known,
 bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* known,
                            std::vector<AnchoredPose>* found) {
   if (!(interval_s_ > 0)) return true;  // nobody knows which frames are in a row
+  Random random(seed_);
   Known with_recognised = *known;
   bool goes_on = true;
   for (const KeptFrame& kept : kept_) {
@@ -159,7 +152,7 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, Known* know
     goes_on = !should_stop || !should_stop();
     if (!goes_on) break;
     Frame frame = FrameOf(kept);
-    if (!localiser_.Relocalise(kept.min_inliers, random_, &frame).has_value()) continue;
+    if (!localiser_.Relocalise(kept.min_inliers, random, &frame).has_value()) continue;
     const std::optional<AnchoredPose> pose = PlausiblePose(*known, &frame);
     if (pose.has_value()) with_recognised.emplace(pose->timestamp_s, *pose);
   }
@@ -236,16 +229,17 @@ std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const Known& known, K
       CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
       const int inliers = localiser_.TrackLocalMap(options_.local_map_radius_px, &frame);
       if (localiser_.pose_tracker().RightInliers() < kept->min_inliers) continue;
-      if (!PlausiblePose(known, &frame).has_value()) continue;
-      if (map_keyframe_) GrowBy(inliers, &frame);
-      return AnchoredPose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
+      std::optional<AnchoredPose> pose = PlausiblePose(known, &frame);
+      if (!pose.has_value()) continue;
+      if (map_keyframe_) GrowBy(frame, inliers, &*pose);
+      return pose;
     }
   }
   return std::nullopt;
 }
 
-void Backfiller::GrowBy(int inliers, Frame* frame) {
-  const int64_t number = frame->id.value();
+void Backfiller::GrowBy(const Frame& frame, int inliers, AnchoredPose* pose) {
+  const int64_t number = frame.id.value();
   const bool goes_on = std::abs(number - chain_.last) == 1;
   chain_.last = number;
   chain_.most_inliers = std::max(chain_.most_inliers, inliers);
@@ -257,12 +251,11 @@ void Backfiller::GrowBy(int inliers, Frame* frame) {
   if (goes_on && DecideKeyframe(input, options_.keyframe) == KeyframeReason::kNone) return;
   {
     const auto map = map_->Write();
-    frame->reference = InsertKeyframe(*frame, map.get(), map->PartOf(frame->reference));
+    pose->reference = InsertKeyframe(frame, map.get(), map->PartOf(pose->reference));
   }
-  frame->cam_from_reference = Rigid3();
-  frame->reference_unit = 1;
+  pose->cam_from_reference = Rigid3();
   chain_ = {number, number, inliers};
-  map_keyframe_(frame->reference);
+  map_keyframe_(pose->reference);
 }
 
 std::vector<Backfiller::Guess> Backfiller::Guesses(const Known& known, double timestamp_s) const {

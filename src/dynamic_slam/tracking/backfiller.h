@@ -58,8 +58,8 @@ class Backfiller {
     std::vector<float> static_probability;
     int min_inliers = 0;
     bool has_pose = false;
-    bool is_left_out = false;                                // for now
     std::optional<std::pair<double, double>> tried_between;  // stamps of the poses before and after it, s
+    bool is_left_out = false;                                // for now
   };
   using Known = std::map<double, AnchoredPose>;  // by stamp
 
@@ -70,7 +70,7 @@ class Backfiller {
   };
 
   // Frames in a row, forwards or backwards, by which the map grows: numbers of frames, and the most inliers
-  // since the keyframe.
+  // from the keyframe on.
   struct Chain {
     int64_t keyframe = -2, last = -2;
     int most_inliers = 0;
@@ -96,8 +96,8 @@ class Backfiller {
   // show.
   void LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found);
   Frame FrameOf(const KeptFrame& kept);
-  // Makes the frame, which is anchored, a keyframe where that is due.
-  void GrowBy(int inliers, Frame* frame);
+  // Makes the frame a keyframe where that is due; its pose hangs on that then.
+  void GrowBy(const Frame& frame, int inliers, AnchoredPose* pose);
   // Anchors the frame at the pose that the localiser found; none if that cannot be.
   std::optional<AnchoredPose> PlausiblePose(const Known& known, Frame* frame);
   std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
@@ -111,7 +111,6 @@ class Backfiller {
   ShutterCorrection shutter_;
   MapLocaliser localiser_;
   uint64_t seed_;
-  Random random_;
   std::deque<KeptFrame> kept_;  // in the order of time
   size_t keypoints_ = 0;        // of all of them
   double interval_s_ = 0, max_gap_s_ = 0;
