@@ -236,6 +236,32 @@ TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "trajectory_3.txt"));
 }
 
+TEST_F(SystemTest, WhereFramesOfOneMapFollowThoseOfAnotherTheyAreOne) {
+  const Room room = MakeRoom(150), other = MakeRoom(3, 2);
+  const std::vector<cv::Mat> images =
+      Join(Join(Frames(room, 0, 80), Frames(other, 0, 3)), Frames(room, 83, 150));
+  SystemOptions options;
+  options.tracker.min_relocalisation_inliers = 1000;  // so that it is lost
+  options.loop.min_inliers = 1000;
+  options.orb.features = 400;
+  for (const bool joins : {false, true}) {
+    options.loop.enabled = joins;
+    ImageSource source(images);
+    const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+    EXPECT_EQ(run.summary.maps, joins ? 1u : 2u);
+    EXPECT_EQ(run.summary.loops.joined, joins ? 1 : 0);
+    const size_t frames = run.system->FrameTrajectory().size();
+    if (!joins) {
+      EXPECT_LT(frames, 120u);
+      continue;
+    }
+    EXPECT_GE(frames, 147u) << "all but those of the other room";
+    EXPECT_LE(ApeRmse(room.truth(), run.system->FrameTrajectory()),
+              0.01 * PathLength(ToPoseList(room.truth())));
+    EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
+  }
+}
+
 TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {
   const Room room = MakeRoom(60);
   ImageSource source(Join(Join(Frames(room, 0, 12), BlackFrames(20)), Frames(room, 30, 60)));

@@ -31,16 +31,42 @@ LoopCloser::LoopCloser(const Camera& camera, const LoopOptions& options, uint64_
 LoopResult LoopCloser::Process(KeyframeId keyframe, uint32_t epoch,
                                const std::function<bool()>& should_stop) {
   DS_TRACE("loop");
-  if (epoch != epoch_) {
-    epoch_ = epoch;
-    loops_.clear();
-    keyframes_since_loop_ = options_.min_keyframes_between;
-  }
+  BeginEpoch(epoch);
   LoopResult result;
   if (keyframes_since_loop_++ < options_.min_keyframes_between) return result;
   const std::optional<Loop> loop = detector_.Detect(keyframe, epoch, *map_, &result.attempts);
   if (loop.has_value()) Close(*loop, should_stop, &result);
   return result;
+}
+
+LoopResult LoopCloser::Join(Loop loop, LoopAttempt attempt, uint32_t epoch,
+                            const std::function<bool()>& should_stop) {
+  DS_TRACE("loop/join");
+  BeginEpoch(epoch);
+  LoopResult result;
+  {
+    const auto map = map_->Read();
+    const Keyframe* keyframe = map->keyframes().Find(loop.keyframe);
+    const Keyframe* candidate = map->keyframes().Find(loop.candidate);
+    if (map->epoch() != epoch || keyframe == nullptr || candidate == nullptr) return result;
+    attempt.keyframe = loop.keyframe;
+    attempt.candidate = loop.candidate;
+    attempt.timestamp_s = keyframe->timestamp_s();
+    attempt.candidate_timestamp_s = candidate->timestamp_s();
+    attempt.inliers = static_cast<int>(loop.links.size());
+    attempt.scale = loop.keyframe_from_candidate.scale;
+    loop.landmarks = LandmarksOfPlace(*map, *candidate);
+  }
+  result.attempts.push_back(attempt);
+  if (attempt.reason.empty()) Close(loop, should_stop, &result);
+  return result;
+}
+
+void LoopCloser::BeginEpoch(uint32_t epoch) {
+  if (epoch == epoch_) return;
+  epoch_ = epoch;
+  loops_.clear();
+  keyframes_since_loop_ = options_.min_keyframes_between;
 }
 
 void LoopCloser::Close(const Loop& loop, const std::function<bool()>& should_stop, LoopResult* result) {

@@ -32,7 +32,13 @@ class LoopCloser {
   // corrected.
   LoopResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
 
+  // Joins two parts by a similarity of which another is sure. The attempt says how it was found; where it has
+  // a reason, it is no loop, and nothing happens.
+  LoopResult Join(Loop loop, LoopAttempt attempt, uint32_t epoch,
+                  const std::function<bool()>& should_stop = {});
+
  private:
+  void BeginEpoch(uint32_t epoch);
   void Close(const Loop& loop, const std::function<bool()>& should_stop, LoopResult* result);
   void JoinParts(const Loop& loop, Map* map) const;
   int Merge(const Loop& loop, Map* map);

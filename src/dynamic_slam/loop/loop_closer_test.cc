@@ -1,5 +1,7 @@
 #include "dynamic_slam/loop/loop_closer.h"
 
+#include <string>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,6 +42,31 @@ TEST(LoopCloserTest, APlaceInAnotherPartOfTheMapJoinsThem) {
   for (size_t i = 0; i < before.size(); ++i) EXPECT_NEAR(after[i] / before[i], after[0] / before[0], 1e-9);
   EXPECT_NEAR(visits.map.map.UnitOf(visits.ids[1].back()), 1 / kDrift.scale, 0.02);
   EXPECT_THAT(visits.map.map.Validate(), IsEmpty());
+}
+
+TEST(LoopCloserTest, PartsAreJoinedByASimilarityThatIsKnownFromElsewhere) {
+  for (const std::string reason : {"", "nobody is sure of it"}) {
+    TwoVisits visits(kDrift, 0.05, true);
+    const Keyframe& keyframe = visits.map.map.keyframes().At(visits.ids[1].front());
+    const Keyframe& candidate = visits.map.map.keyframes().At(visits.ids[0].back());
+    const Sim3 similarity =
+        ToSim3(keyframe.cam_from_world()) * kDrift * ToSim3(candidate.cam_from_world()).Inverse();
+    LoopCloser closer(visits.world.camera(), {}, 1, &visits.map.shared_map);
+    LoopAttempt attempt;
+    attempt.reason = reason;
+    const LoopResult result = closer.Join({keyframe.id(), candidate.id(), similarity, {}, {}, true}, attempt,
+                                          visits.map.map.epoch());
+    EXPECT_EQ(result.joined, reason.empty());
+    EXPECT_EQ(visits.map.map.Parts().size(), reason.empty() ? 1u : 2u);
+    ASSERT_EQ(result.attempts.size(), 1u);
+    EXPECT_EQ(result.attempts[0].reason, reason);
+    EXPECT_EQ(result.attempts[0].scale, similarity.scale);
+    if (!reason.empty()) continue;
+    EXPECT_LT(visits.WorstCenter(), 1e-6);
+    EXPECT_GT(result.landmarks_merged, 100) << "what both saw is one";
+    EXPECT_THAT(visits.map.map.Validate(), IsEmpty());
+    EXPECT_THAT(closer.Join({}, attempt, visits.map.map.epoch() + 1).attempts, IsEmpty()) << "another map";
+  }
 }
 
 TEST(LoopCloserTest, OtherPartsOfTheMapStayWhereTheyAre) {

@@ -88,6 +88,10 @@ Eigen::Vector2d Pixel(const Keypoint& keypoint) { return {keypoint.x, keypoint.y
 
 }  // namespace
 
+std::vector<LandmarkId> LandmarksOfPlace(const Map& map, const Keyframe& keyframe) {
+  return LandmarksAbout(map, keyframe, kPlaceKeyframes);
+}
+
 LoopDetector::LoopDetector(const Camera& camera, const LoopOptions& options,
                            const std::vector<float>& octave_scales, uint64_t seed)
     : camera_(camera), options_(options), projector_(camera, octave_scales), seed_(seed) {}
@@ -210,8 +214,7 @@ void LoopDetector::AddMatch(const Map& map, const Keyframe& keyframe, const Keyf
 
 Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate,
                           const Sim3& similarity, LoopAttempt* attempt) {
-  Loop loop{keyframe.id(), candidate.id(), similarity, {}, LandmarksAbout(map, candidate, kPlaceKeyframes),
-            true};
+  Loop loop{keyframe.id(), candidate.id(), similarity, {}, LandmarksOfPlace(map, candidate), true};
   const Sim3 candidate_from_world = ToSim3(candidate.cam_from_world());
   for (const double radius_px : {kFirstRadiusPx, kSecondRadiusPx}) {
     const Rigid3 pose = ToRigid3(loop.keyframe_from_candidate * candidate_from_world);

@@ -43,6 +43,9 @@ struct Loop {
   bool has_drifted = true;            // else the map is right, and lacks the links only
 };
 
+// The landmarks about a keyframe that make a place.
+std::vector<LandmarkId> LandmarksOfPlace(const Map& map, const Keyframe& keyframe);
+
 // Looks for loops: places that look alike, matches, a similarity, matches by projection, a look by the
 // neighbours. Holds the map's lock for moments; changes nothing.
 class LoopDetector {

@@ -75,6 +75,7 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
                &map_),
       mapper_(camera(), options.mapper, &map_),
       loop_closer_(camera(), options.loop, options.seed, &map_),
+      bridge_finder_(camera(), options.tracker, &map_),
       executor_(std::move(executor)) {
   if (mode_ == RunMode::kRealtime) StartImageThreads();
   if (mode_ == RunMode::kOffline && options_.backfill) {
@@ -217,7 +218,11 @@ void SlamSystem::PostLoops() {
 void SlamSystem::CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token) {
   const auto start = std::chrono::steady_clock::now();
   const auto should_stop = [&token] { return token.stop_requested(); };
-  const LoopResult result = loop_closer_.Process(keyframe.id, keyframe.epoch, should_stop);
+  FinishLoop(loop_closer_.Process(keyframe.id, keyframe.epoch, should_stop), start, should_stop);
+}
+
+void SlamSystem::FinishLoop(const LoopResult& result, std::chrono::steady_clock::time_point start,
+                            const std::function<bool()>& should_stop) {
   std::optional<BundleSummary> bundle;
   if (result.corrected && options_.loop.full_bundle) {
     bundle = AdjustAll(camera(), options_.mapper, should_stop, &map_);
@@ -248,6 +253,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   if (backfiller_.has_value() && options_.backfill_grows_map && changes_map) {
     Backfill(true, should_stop);
     DrainMapping();
+    if (options_.loop.enabled) JoinParts(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
@@ -257,8 +263,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
 
 void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) {
   std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
-  std::vector<AnchoredPose> known;
-  for (const TrackedFrame& frame : all) known.push_back(frame.Pose());
+  const std::vector<AnchoredPose> known = TrackedPoses();
   const uint32_t epoch = map_.Read()->epoch();
   const auto map_keyframe = [this, epoch](KeyframeId keyframe) {
     PostMapping(keyframe, epoch);
@@ -271,6 +276,33 @@ void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) 
     return a.timestamp_s < b.timestamp_s;
   });
   tracked_.Assign(all);
+}
+
+void SlamSystem::JoinParts(const std::function<bool()>& should_stop) {
+  if (Parts().size() < 2) return;
+  std::vector<AnchoredPose> poses = TrackedPoses();
+  const std::vector<AnchoredPose> found = backfiller_->Find(poses, should_stop);
+  poses.insert(poses.end(), found.begin(), found.end());
+  const KnownPoses known(poses, &map_);
+  const uint32_t epoch = map_.Read()->epoch();
+  for (const BridgeFinder::Border& border : BridgeFinder::Borders(known)) {
+    if (should_stop && should_stop()) return;
+    if (known.AreInOnePart(border.before, border.after)) continue;  // by now
+    const auto start = std::chrono::steady_clock::now();
+    const Bridge bridge = bridge_finder_.Find(known, border);
+    Loop loop{bridge.keyframe, bridge.neighbour, bridge.keyframe_from_neighbour, {}, {}, true};
+    for (const auto& [keypoint, landmark] : bridge.links) loop.links.push_back({keypoint, landmark});
+    LoopAttempt attempt;
+    attempt.matches = bridge.common;
+    attempt.reason = bridge.reason;
+    FinishLoop(loop_closer_.Join(loop, attempt, epoch, should_stop), start, should_stop);
+  }
+}
+
+std::vector<AnchoredPose> SlamSystem::TrackedPoses() const {
+  std::vector<AnchoredPose> poses;
+  for (const TrackedFrame& frame : tracked_) poses.push_back(frame.Pose());
+  return poses;
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {

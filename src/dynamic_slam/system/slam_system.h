@@ -24,6 +24,7 @@
 #include "dynamic_slam/system/run_mode.h"
 #include "dynamic_slam/system/system_options.h"
 #include "dynamic_slam/tracking/backfiller.h"
+#include "dynamic_slam/tracking/bridge_finder.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
@@ -153,12 +154,18 @@ class SlamSystem {
   void Remember(const FrameResult& result);
   // Looks for poses of frames that have none; grows: and lets the map grow by them.
   void Backfill(bool grows, const std::function<bool()>& should_stop);
+  // Makes one of parts of the map where frames of one follow those of another.
+  void JoinParts(const std::function<bool()>& should_stop);
+  std::vector<AnchoredPose> TrackedPoses() const;
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops
   // Looks for loops at the keyframes that local mapping has done since the last call.
   void PostLoops();
   void CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token);
+  // Adjusts the map where it was moved, and reports.
+  void FinishLoop(const LoopResult& result, std::chrono::steady_clock::time_point start,
+                  const std::function<bool()>& should_stop);
 
   SystemOptions options_;
   ImagePreparer preparer_;
@@ -173,6 +180,7 @@ class SlamSystem {
   std::optional<DetectionStage> detection_;
   FileBackedVector<TrackedFrame> tracked_;  // in the order of time
   std::optional<Backfiller> backfiller_;    // offline, unless it is turned off
+  BridgeFinder bridge_finder_;
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work
   cv::Mat colour_;              // that of the last question to the detector; free once that is answered

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -13,6 +12,7 @@
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/tracking/known_poses.h"
 #include "dynamic_slam/tracking/map_localiser.h"
 #include "dynamic_slam/tracking/shutter_correction.h"
 
@@ -61,14 +61,6 @@ class Backfiller {
     std::optional<std::pair<double, double>> tried_between;  // stamps of the poses before and after it, s
     bool is_left_out = false;                                // for now
   };
-  using Known = std::map<double, AnchoredPose>;  // by stamp
-
-  // Where a frame may be, and a keyframe near there.
-  struct Guess {
-    KeyframeId keyframe;
-    Rigid3 cam_from_world;
-  };
-
   // Frames in a row, forwards or backwards, by which the map grows: numbers of frames, and the most inliers
   // from the keyframe on.
   struct Chain {
@@ -76,22 +68,16 @@ class Backfiller {
     int most_inliers = 0;
   };
 
-  // How fast the camera was, and how often there are frames.
-  void LearnMotion(const Known& known);
-  bool AreInOnePart(const AnchoredPose& a, const AnchoredPose& b) const;
-  // Whether the camera can have come from one to the other, as far as is known.
-  bool IsReachable(const AnchoredPose& a, const AnchoredPose& b) const;
-  // The same from the pose before, and to the pose after.
-  bool IsPlausible(const Known& known, const AnchoredPose& pose) const;
   // A rolling shutter: moves the keypoints by how the camera came here from the nearest pose that is known.
-  void CorrectShutterAt(const Known& known, const Guess& guess, Frame* frame) const;
+  void CorrectShutterAt(const KnownPoses& known, const KnownPoses::Guess& guess, Frame* frame) const;
   // These add to known and found; false: they were told to stop. From the poses that are known, from
   // neighbour to neighbour.
-  bool Spread(const std::function<bool()>& should_stop, Known* known, std::vector<AnchoredPose>* found);
+  bool Spread(const std::function<bool()>& should_stop, KnownPoses* known, std::vector<AnchoredPose>* found);
   // Far from any: by what frames look like, each for itself. A pose that the next frame does not confirm was
   // found by chance, or on somebody who was there before.
-  bool Recognise(const std::function<bool()>& should_stop, Known* known, std::vector<AnchoredPose>* found);
-  std::optional<AnchoredPose> FindFromNeighbours(const Known& known, KeptFrame* kept);
+  bool Recognise(const std::function<bool()>& should_stop, KnownPoses* known,
+                 std::vector<AnchoredPose>* found);
+  std::optional<AnchoredPose> FindFromNeighbours(const KnownPoses& known, KeptFrame* kept);
   // Frames in a row of which no more are missing in these than are bridged anyhow: the map has what they
   // show.
   void LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found);
@@ -99,12 +85,7 @@ class Backfiller {
   // Makes the frame a keyframe where that is due; its pose hangs on that then.
   void GrowBy(const Frame& frame, int inliers, AnchoredPose* pose);
   // Anchors the frame at the pose that the localiser found; none if that cannot be.
-  std::optional<AnchoredPose> PlausiblePose(const Known& known, Frame* frame);
-  std::vector<Guess> Guesses(const Known& known, double timestamp_s) const;
-  // Adds where the camera is at the stamp if it went on as between the two poses, and where it was at the
-  // nearer.
-  void Extrapolate(const AnchoredPose& nearer, const AnchoredPose* farther, double timestamp_s,
-                   const Map& map, std::vector<Guess>* guesses) const;
+  std::optional<AnchoredPose> PlausiblePose(const KnownPoses& known, Frame* frame);
 
   TrackerOptions options_;
   SharedMap* map_;
@@ -113,9 +94,7 @@ class Backfiller {
   uint64_t seed_;
   std::deque<KeptFrame> kept_;  // in the order of time
   size_t keypoints_ = 0;        // of all of them
-  double interval_s_ = 0, max_gap_s_ = 0;
-  std::map<PartId, double> max_speed_;  // map units per s
-  MapKeyframe map_keyframe_;            // empty: the map stays as it is
+  MapKeyframe map_keyframe_;    // empty: the map stays as it is
   Chain chain_;
 };
 

@@ -1,0 +1,215 @@
+#include "dynamic_slam/tracking/bridge_finder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "dynamic_slam/base/percentile.h"
+#include "dynamic_slam/base/trace.h"
+
+namespace dynamic_slam {
+namespace {
+
+// Keyframes on either side of a border that are looked for from the other.
+constexpr size_t kKeyframes = 4;
+
+// By how much the ratio of depths may differ from landmark to landmark, one standard deviation: as well as a
+// depth is known (Sim3Estimate). Else one of the parts has no scale of its own: it drifted, or is on movers.
+constexpr double kMaxScaleSpread = 0.2;
+
+// One keyframe may stand wrong; two that agree do not.
+constexpr int kMinAgreeing = 2;
+
+// They agree where the landmarks that one shows are no farther from where the other has them than loops look.
+constexpr double kAgreement_px = 10;
+
+// Standard deviation, from the quartiles of a Gaussian.
+double Spread(std::vector<double>* values) {
+  return 0.7413 * (Percentile(0.75, values) - Percentile(0.25, values));
+}
+
+Sim3 ScaleBy(double scale) { return {scale, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()}; }
+
+}  // namespace
+
+BridgeFinder::BridgeFinder(const Camera& camera, const TrackerOptions& options, SharedMap* map)
+    : camera_(camera),
+      options_(options),
+      map_(map),
+      localiser_(camera, options, map->Read()->octave_scales(), map) {}
+
+std::vector<BridgeFinder::Border> BridgeFinder::Borders(const KnownPoses& known) {
+  std::vector<Border> borders;
+  const KnownPoses::ByStamp& poses = known.by_stamp();
+  if (poses.empty()) return borders;
+  for (auto pose = poses.begin(); std::next(pose) != poses.end(); ++pose) {
+    const AnchoredPose &before = pose->second, &after = std::next(pose)->second;
+    if (after.timestamp_s - before.timestamp_s <= known.max_gap_s() && !known.AreInOnePart(before, after))
+      borders.push_back({before, after});
+  }
+  return borders;
+}
+
+Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
+  DS_TRACE("backfill/bridge");
+  std::vector<Sighting> sightings;
+  Look(known, border.before, border.after, &sightings);
+  Look(known, border.after, border.before, &sightings);
+
+  Bridge none;
+  std::vector<double> ratios;
+  for (const Sighting& sighting : sightings)
+    ratios.insert(ratios.end(), sighting.depth_ratios.begin(), sighting.depth_ratios.end());
+  none.common = static_cast<int>(ratios.size());
+  {
+    const auto map = map_->Read();
+    none.keyframe = map->ResolveKeyframe(border.after.reference).keyframe;
+    none.neighbour = map->ResolveKeyframe(border.before.reference).keyframe;
+  }
+  if (none.common < options_.pnp.min_inliers) {
+    none.reason = fmt::format("{} landmarks are in both parts < {}", none.common, options_.pnp.min_inliers);
+    return none;
+  }
+  const double scale = Percentile(0.5, &ratios);
+  if (const double spread = Spread(&ratios) / scale; spread > kMaxScaleSpread) {
+    none.reason = fmt::format("depths of landmarks in both parts differ by {:.0f}% > {:.0f}% about one scale",
+                              100 * spread, 100 * kMaxScaleSpread);
+    return none;
+  }
+
+  const Sighting* best = nullptr;
+  int most_agreeing = 0;
+  for (const Sighting& sighting : sightings) {
+    Sim3 after_from_before;
+    {
+      const auto map = map_->Read();
+      const Sim3 cam_from_here = ToSim3(map->keyframes().At(sighting.bridge.keyframe).cam_from_world());
+      const Sim3 cam_from_there = ToSim3(sighting.cam_from_there);
+      after_from_before = sighting.is_after ? cam_from_here.Inverse() * ScaleBy(scale) * cam_from_there
+                                            : cam_from_there.Inverse() * ScaleBy(scale) * cam_from_here;
+    }
+    const int agreeing = CountAgreeing(sightings, after_from_before);
+    if (best != nullptr && std::pair(agreeing, sighting.inliers) <= std::pair(most_agreeing, best->inliers))
+      continue;
+    best = &sighting;
+    most_agreeing = agreeing;
+  }
+  if (most_agreeing < kMinAgreeing) {
+    none.reason = fmt::format("{} of {} keyframes by which the parts fit together agree < {}", most_agreeing,
+                              sightings.size(), kMinAgreeing);
+    return none;
+  }
+
+  Bridge bridge = best->bridge;
+  bridge.common = none.common;
+  const auto map = map_->Read();
+  const Rigid3 motion =
+      best->cam_from_there * map->keyframes().At(bridge.neighbour).cam_from_world().Inverse();
+  bridge.keyframe_from_neighbour = ScaleBy(best->is_after ? scale : 1 / scale) * ToSim3(motion);
+  return bridge;
+}
+
+void BridgeFinder::Look(const KnownPoses& known, const AnchoredPose& from, const AnchoredPose& to,
+                        std::vector<Sighting>* sightings) {
+  struct Target {
+    KeyframeId id;
+    double away_s = 0;
+  };
+  std::vector<Target> targets;
+  PartId here, there;
+  double unit = 1;  // of `to` in that of `from`, about
+  {
+    const auto map = map_->Read();
+    here = map->PartOf(from.reference), there = map->PartOf(to.reference);
+    map->keyframes().ForEach([&](const Keyframe& keyframe) {
+      const bool is_of_this_run = keyframe.frame_id().IsValid();  // a map that was loaded has other stamps
+      if (keyframe.part() == there && is_of_this_run)
+        targets.push_back({keyframe.id(), std::abs(keyframe.timestamp_s() - to.timestamp_s)});
+    });
+    const double depth_here = map->MedianDepth(map->ResolveKeyframe(from.reference).keyframe);
+    const double depth_there = map->MedianDepth(map->ResolveKeyframe(to.reference).keyframe);
+    if (depth_here > 0 && depth_there > 0) unit = depth_here / depth_there;
+  }
+  if (here == there) return;  // they were joined meanwhile
+  std::stable_sort(targets.begin(), targets.end(),
+                   [](const Target& a, const Target& b) { return a.away_s < b.away_s; });
+  targets.resize(std::min(targets.size(), kKeyframes));
+  const std::vector<KnownPoses::Guess> guesses = known.InPart(here).Guesses(to.timestamp_s);
+  for (const Target& target : targets) {
+    Frame frame;
+    Rigid3 keyframe_from_frame;
+    {
+      const auto map = map_->Read();
+      const Keyframe& keyframe = map->keyframes().At(target.id);
+      frame.features = keyframe.features();
+      frame.grid = keyframe.grid();
+      frame.static_probability = keyframe.static_probability();
+      keyframe_from_frame =
+          keyframe.cam_from_world() * map->PoseFromReference(to.reference, to.cam_from_reference).Inverse();
+    }
+    keyframe_from_frame.translation *= unit;
+    const bool is_found = std::any_of(guesses.begin(), guesses.end(), [&](const KnownPoses::Guess& guess) {
+      return Localise({guess.keyframe, keyframe_from_frame * guess.cam_from_world}, &frame);
+    });
+    if (is_found) sightings->push_back(SightingOf(target.id, to.timestamp_s > from.timestamp_s, frame));
+  }
+}
+
+bool BridgeFinder::Localise(const KnownPoses::Guess& guess, Frame* frame) {
+  // A keyframe does not say how much of it was in the boxes of movers: as if all had been.
+  const int found = std::max(options_.min_inliers, options_.movers_min_inliers);
+  for (const double search : KnownPoses::kSearches) {
+    if (localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
+                             frame) < options_.min_motion_inliers)
+      continue;
+    if (localiser_.TrackLocalMap(options_.local_map_radius_px, frame) >= found &&
+        localiser_.pose_tracker().RightInliers() >= options_.min_inliers)
+      return true;
+  }
+  return false;
+}
+
+BridgeFinder::Sighting BridgeFinder::SightingOf(KeyframeId id, bool is_after, const Frame& frame) {
+  Sighting sighting;
+  sighting.is_after = is_after;
+  sighting.cam_from_there = frame.cam_from_world;
+  sighting.inliers = localiser_.pose_tracker().RightInliers();
+  sighting.bridge.keyframe = id;
+  const auto map = map_->Read();
+  sighting.bridge.neighbour = map->ResolveKeyframe(localiser_.view().reference).keyframe;
+  const Keyframe& keyframe = map->keyframes().At(id);
+  for (uint32_t keypoint = 0; keypoint < frame.landmarks.size(); ++keypoint) {
+    const LandmarkId there = map->Resolve(frame.landmarks[keypoint]);
+    if (!there.IsValid()) continue;
+    sighting.bridge.links.emplace_back(keypoint, there);
+    const LandmarkId here = keyframe.landmarks()[keypoint];
+    if (!here.IsValid()) continue;
+    const double depth = (keyframe.cam_from_world() * map->landmarks().At(here).position()).z();
+    const double depth_there = (frame.cam_from_world * map->landmarks().At(there).position()).z();
+    if (depth > 0 && depth_there > 0)
+      sighting.depth_ratios.push_back(is_after ? depth / depth_there : depth_there / depth);
+  }
+  return sighting;
+}
+
+int BridgeFinder::CountAgreeing(const std::vector<Sighting>& sightings, const Sim3& after_from_before) const {
+  const auto map = map_->Read();
+  return static_cast<int>(std::count_if(sightings.begin(), sightings.end(), [&](const Sighting& sighting) {
+    const Sim3 here_from_there = sighting.is_after ? after_from_before : after_from_before.Inverse();
+    const Keyframe& keyframe = map->keyframes().At(sighting.bridge.keyframe);
+    const Rigid3 by_similarity = ToRigid3(ToSim3(keyframe.cam_from_world()) * here_from_there);
+    std::vector<double> away_px;
+    for (const auto& [keypoint, landmark] : sighting.bridge.links) {
+      const Eigen::Vector3d x = by_similarity * map->landmarks().At(landmark).position();
+      const Keypoint& seen = keyframe.keypoint(keypoint);
+      away_px.push_back(x.z() > 0 ? (camera_.Project(x) - Eigen::Vector2d(seen.x, seen.y)).norm()
+                                  : camera_.width);
+    }
+    return !away_px.empty() && Percentile(0.5, &away_px) <= kAgreement_px;
+  }));
+}
+
+}  // namespace dynamic_slam
