@@ -156,6 +156,7 @@ class SlamSystem {
   void Backfill(bool grows, const std::function<bool()>& should_stop);
   // Makes one of parts of the map where frames of one follow those of another.
   void JoinParts(const std::function<bool()>& should_stop);
+  void SmoothPaths();
   std::vector<AnchoredPose> TrackedPoses() const;
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);

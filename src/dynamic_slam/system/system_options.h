@@ -18,6 +18,7 @@ struct SystemOptions {
   bool final_bundle = true;
   bool backfill = true;
   bool backfill_grows_map = true;
+  bool smooth_path = true;
   ImageOptions image;
   DetectionOptions detector;
   OrbOptions orb;
@@ -41,6 +42,11 @@ struct SystemOptions {
           OptionField{"", 0, 1,
                       "Before the map is finished it grows by such frames, where they show what it does not "
                       "have."});
+    visit("smooth_path", self.smooth_path,
+          OptionField{
+              "", 0, 1,
+              "Offline: the path is what is most probable, as poses are noisy and what carries a camera "
+              "has mass. How noisy, the poses themselves tell. Keyframes and map stay as they are."});
     visit("image", self.image);
     visit("detector", self.detector);
     visit("dynamic", self.dynamic);
