@@ -92,8 +92,9 @@ std::vector<Run> MakeRuns(const AblationArguments& arguments) {
                        .title = fmt::format("{}: {}, run {}", name, variant.name, number),
                        .source = source,
                        .arguments = arguments};
-        // Poses of frames that had none when their turn came say nothing of tracking.
+        // Poses of frames that had none when their turn came say nothing of tracking, nor do smooth ones.
         unit.arguments.assignments.push_back("backfill=false");
+        unit.arguments.assignments.push_back("smooth_path=false");
         unit.arguments.assignments.push_back(fmt::format("seed={}", number));
         if (*variant.assignment != 0) unit.arguments.assignments.push_back(variant.assignment);
         runs.push_back({std::move(unit), variant.name, number, {}, {}});

@@ -262,6 +262,34 @@ TEST_F(SystemTest, WhereFramesOfOneMapFollowThoseOfAnotherTheyAreOne) {
   }
 }
 
+TEST_F(SystemTest, ThePathIsSmootherThanItsPosesAndTheMapIsTheSame) {
+  const Room room = MakeRoom(90);
+  double jolts[2], errors[2];
+  Trajectory keyframes[2];
+  for (const bool is_smooth : {false, true}) {
+    ImageSource source(Frames(room, 0, 90));
+    SystemOptions options;
+    options.orb.features = 300;  // noisy
+    options.smooth_path = is_smooth;
+    const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+    const Trajectory path = run.system->FrameTrajectory();
+    double sum = 0;
+    for (size_t i = 2; i < path.size(); ++i) {
+      sum += (path[i].world_from_cam.translation - 2 * path[i - 1].world_from_cam.translation +
+              path[i - 2].world_from_cam.translation)
+                 .squaredNorm();
+    }
+    jolts[is_smooth] = std::sqrt(sum);
+    errors[is_smooth] = ApeRmse(room.truth(), path);
+    keyframes[is_smooth] = run.system->KeyframeTrajectory();
+  }
+  EXPECT_LT(jolts[1], 0.7 * jolts[0]);
+  EXPECT_LT(errors[1], errors[0]);
+  ASSERT_EQ(keyframes[0].size(), keyframes[1].size());
+  for (size_t i = 0; i < keyframes[0].size(); ++i)
+    EXPECT_EQ(keyframes[0][i].world_from_cam, keyframes[1][i].world_from_cam);
+}
+
 TEST_F(SystemTest, ASmallMapThatLostTheCameraIsGivenUp) {
   const Room room = MakeRoom(60);
   ImageSource source(Join(Join(Frames(room, 0, 12), BlackFrames(20)), Frames(room, 30, 60)));

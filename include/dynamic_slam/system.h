@@ -33,7 +33,7 @@ class DYNAMIC_SLAM_API System {
   ImageResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
   // To be called after the last image: adjusts the whole map and, offline, finds poses of images that have
-  // none yet. No more images after that, unless Reset is called.
+  // none yet and smooths the path. No more images after that, unless Reset is called.
   void Finish();
 
   // Forgets all images and the map, and that of Options::map too.

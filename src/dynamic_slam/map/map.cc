@@ -327,6 +327,16 @@ Rigid3 Map::PoseFromReference(KeyframeId reference, const Rigid3& cam_from_refer
   return ToRigid3(own_from_world);
 }
 
+Rigid3 Map::CamFromReference(KeyframeId reference, const Rigid3& cam_from_world) const {
+  const Anchor anchor = ResolveKeyframe(reference);
+  const Sim3 own_from_world = anchor.original_from_keyframe * OwnFromWorld(keyframes_.At(anchor.keyframe));
+  // With the world's unit of length for the camera's, as ToRigid3 has it.
+  const Sim3 cam_from_reference =
+      Sim3{own_from_world.scale, cam_from_world.rotation, own_from_world.scale * cam_from_world.translation} *
+      own_from_world.Inverse();
+  return {cam_from_reference.rotation, cam_from_reference.translation};
+}
+
 PartId Map::PartOf(KeyframeId reference) const {
   const Keyframe* keyframe = keyframes_.Find(ResolveKeyframe(reference).keyframe);
   return keyframe != nullptr ? keyframe->part() : PartId();

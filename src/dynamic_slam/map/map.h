@@ -99,6 +99,9 @@ class Map {
   // its part must not be gone. cam_from_reference: in units of the reference (Keyframe::unit).
   Rigid3 PoseFromReference(KeyframeId reference, const Rigid3& cam_from_reference) const;
 
+  // The other way round: what hangs a frame on `reference` so that its pose is this one.
+  Rigid3 CamFromReference(KeyframeId reference, const Rigid3& cam_from_world) const;
+
   // The part of the map in which such a frame is; not valid when it is gone.
   PartId PartOf(KeyframeId reference) const;
 

@@ -134,6 +134,20 @@ TEST(MapTest, FramesFollowTheScaleOfTheirKeyframeAndOfItsHeir) {
   EXPECT_LT((map.PoseFromReference(a, cam_from_a).TargetOriginInSource() - 4 * before).norm(), 1e-12);
 }
 
+TEST(MapTest, AFrameIsHungWhereItIsToldWhateverTheScale) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 4, Rigid3(ExpSo3({0.1, 0, 0}), {1, 0, 0}));
+  const KeyframeId b = AddKeyframe(&map, 4, Rigid3(ExpSo3({0, 0.2, 0}), {0, 2, 0}));
+  map.keyframes().At(a).Rescale(2);
+  const Rigid3 pose(ExpSo3({0.3, -0.2, 0.1}), {0.4, 0.5, 0.6});
+  for (const bool is_erased : {false, true}) {
+    if (is_erased) map.EraseKeyframe(a, b);
+    const Rigid3 there = map.PoseFromReference(a, map.CamFromReference(a, pose));
+    EXPECT_LT((there.translation - pose.translation).norm(), 1e-12) << is_erased;
+    EXPECT_LT(there.rotation.angularDistance(pose.rotation), 1e-7) << is_erased;
+  }
+}
+
 TEST(MapTest, KnowsThePlacesOfItsKeyframesOnly) {
   Map map = MakeMap();
   const KeyframeId a = AddKeyframe(&map, 4), b = AddKeyframe(&map, 4);

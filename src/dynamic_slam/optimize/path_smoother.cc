@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "dynamic_slam/base/trace.h"
 
@@ -15,6 +16,11 @@ constexpr size_t kFewest = 10;
 constexpr double kDegrees = 4;
 
 constexpr int kReweightings = 5;
+
+// A step so many times as fast as any of so many before and after it is none that a camera made: the film was
+// cut. A wrong pose makes two such steps.
+constexpr double kCutRatio = 5;
+constexpr size_t kCutSteps = 3;
 
 // Two images at one time are a moment apart.
 constexpr double kMinStep_s = 1e-6;
@@ -39,7 +45,7 @@ class PointSmoother {
     double ratio = 1;
     ChooseRatio(kLeastRatio, kMostRatio, 10, &ratio);
     for (int i = 0; i <= kReweightings; ++i) {
-      ChooseRatio(ratio / 4, ratio * 4, 2, &ratio);
+      ChooseRatio(std::max(ratio / 4, kLeastRatio), std::min(ratio * 4, kMostRatio), 2, &ratio);
       Filter(ratio);
       if (!(variance_ > 0)) return points_;  // it stands, exactly
       SmoothBack();
@@ -146,18 +152,34 @@ class PointSmoother {
   double variance_ = 0;  // of the noise of a point, in each coordinate
 };
 
-}  // namespace
+// Whether the film was cut before the pose, which has kCutSteps steps before and after that one.
+bool IsCut(std::span<const StampedPose> poses, size_t i) {
+  const auto speeds = [&](size_t k) {
+    const Rigid3 &from = poses[k - 1].world_from_cam, &to = poses[k].world_from_cam;
+    const double dt_s = std::max(poses[k].timestamp_s - poses[k - 1].timestamp_s, kMinStep_s);
+    return std::pair((to.translation - from.translation).norm() / dt_s,
+                     to.rotation.angularDistance(from.rotation) / dt_s);
+  };
+  double fastest = 0, fastest_turn = 0;
+  for (size_t k = i - kCutSteps; k <= i + kCutSteps; ++k) {
+    if (k == i) continue;
+    const auto [speed, turn] = speeds(k);
+    fastest = std::max(fastest, speed);
+    fastest_turn = std::max(fastest_turn, turn);
+  }
+  const auto [speed, turn] = speeds(i);
+  return speed > kCutRatio * fastest || turn > kCutRatio * fastest_turn;
+}
 
-std::vector<Rigid3> SmoothPath(std::span<const PathPose> poses) {
-  DS_TRACE("smooth");
-  std::vector<Rigid3> smooth;
-  for (const PathPose& pose : poses) smooth.push_back(pose.world_from_cam);
-  if (poses.size() < kFewest) return smooth;
+// Without cuts.
+void SmoothShot(std::span<const StampedPose> poses, std::vector<Rigid3>* smooth) {
+  const size_t first = smooth->size();
+  for (const StampedPose& pose : poses) smooth->push_back(pose.world_from_cam);
+  if (poses.size() < kFewest) return;
   std::vector<double> stamps_s;
   std::vector<Eigen::Vector3d> positions;
-  std::vector<Eigen::Vector4d>
-      orientations;  // a quaternion and its negative are the same: the nearer to the last
-  for (const PathPose& pose : poses) {
+  std::vector<Eigen::Vector4d> orientations;  // of a quaternion and its negative, the nearer to the last
+  for (const StampedPose& pose : poses) {
     stamps_s.push_back(pose.timestamp_s);
     positions.push_back(pose.world_from_cam.translation);
     const Eigen::Vector4d q = pose.world_from_cam.rotation.coeffs();
@@ -165,8 +187,22 @@ std::vector<Rigid3> SmoothPath(std::span<const PathPose> poses) {
   }
   positions = PointSmoother<3>(stamps_s, std::move(positions)).Smooth();
   orientations = PointSmoother<4>(stamps_s, std::move(orientations)).Smooth();
-  for (size_t i = 0; i < smooth.size(); ++i)
-    smooth[i] = Rigid3(Eigen::Quaterniond(orientations[i]), positions[i]);
+  for (size_t i = 0; i < poses.size(); ++i)
+    (*smooth)[first + i] = Rigid3(Eigen::Quaterniond(orientations[i]), positions[i]);
+}
+
+}  // namespace
+
+std::vector<Rigid3> SmoothPath(std::span<const StampedPose> poses) {
+  DS_TRACE("smooth");
+  std::vector<Rigid3> smooth;
+  smooth.reserve(poses.size());
+  for (size_t begin = 0, end = 0; begin < poses.size(); begin = end) {
+    end = begin + 1;
+    while (end < poses.size() && (end <= kCutSteps || end + kCutSteps >= poses.size() || !IsCut(poses, end)))
+      ++end;
+    SmoothShot(poses.subspan(begin, end - begin), &smooth);
+  }
   return smooth;
 }
 

@@ -259,7 +259,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) Backfill(false, should_stop);
-  if (mode_ == RunMode::kOffline && options_.smooth_path) SmoothPaths();
+  if (mode_ == RunMode::kOffline && options_.smooth_path) SmoothPaths(should_stop);
   return bundle;
 }
 
@@ -301,27 +301,32 @@ void SlamSystem::JoinParts(const std::function<bool()>& should_stop) {
   }
 }
 
-void SlamSystem::SmoothPaths() {
+void SlamSystem::SmoothPaths(const std::function<bool()>& should_stop) {
   std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
   std::map<PartId, std::vector<size_t>> frames;
-  std::vector<Rigid3> world_from_cam;
-  const auto map = map_.Read();
-  for (size_t i = 0; i < all.size(); ++i) {
-    const AnchoredPose pose = all[i].Pose();
-    world_from_cam.push_back(map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse());
-    frames[map->PartOf(pose.reference)].push_back(i);
+  std::vector<StampedPose> poses;
+  {
+    const auto map = map_.Read();
+    for (size_t i = 0; i < all.size(); ++i) {
+      const AnchoredPose pose = all[i].Pose();
+      poses.push_back(
+          {pose.timestamp_s, map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse()});
+      frames[map->PartOf(pose.reference)].push_back(i);
+    }
   }
   for (const auto& [part, those] : frames) {
-    std::vector<PathPose> path;
-    for (const size_t i : those) path.push_back({all[i].timestamp_s, world_from_cam[i]});
+    if (should_stop && should_stop()) return;
+    std::vector<StampedPose> path;
+    for (const size_t i : those) path.push_back(poses[i]);
     const std::vector<Rigid3> smooth = SmoothPath(path);
-    for (size_t k = 0; k < those.size(); ++k) {
-      TrackedFrame& frame = all[those[k]];
-      Rigid3 moved = smooth[k].Inverse() * world_from_cam[those[k]];
-      moved.translation /= map->UnitOf(frame.reference);
-      AnchoredPose pose = frame.Pose();
-      pose.cam_from_reference = moved * pose.cam_from_reference;
-      frame = TrackedFrame(pose, frame.is_live);
+    for (size_t k = 0; k < those.size(); ++k) poses[those[k]].world_from_cam = smooth[k];
+  }
+  {
+    const auto map = map_.Read();
+    for (size_t i = 0; i < all.size(); ++i) {
+      AnchoredPose pose = all[i].Pose();
+      pose.cam_from_reference = map->CamFromReference(pose.reference, poses[i].world_from_cam.Inverse());
+      all[i] = TrackedFrame(pose, all[i].is_live);
     }
   }
   tracked_.Assign(all);

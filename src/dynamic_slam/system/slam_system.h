@@ -49,13 +49,14 @@ struct MappingReport {
 
 // What the search for loops has found so far.
 struct LoopReport {
-  std::vector<LoopAttempt> attempts;  // of all keyframes, in their order; a reason says why one was refused
-  int linked = 0;                     // places known again where nothing had to be moved
-  int corrected = 0;                  // loops after which the map was moved
-  int joined = 0;                     // of these, those that made one of two parts of the map
+  // Of all keyframes, in their order, then of the borders of parts; a reason says why one was refused.
+  std::vector<LoopAttempt> attempts;
+  int linked = 0;     // places known again where nothing had to be moved
+  int corrected = 0;  // loops after which the map was moved
+  int joined = 0;     // of these, those that made one of two parts of the map
   int landmarks_merged = 0;
   int bundles = 0, bundles_stopped = 0;  // adjustments of the whole map after that
-  std::vector<double> times_ms;          // of each keyframe that was looked at
+  std::vector<double> times_ms;          // of each keyframe, and each border, that was looked at
 };
 
 // Dynamic-SLAM. All calls come from one thread; in realtime mode the stages beside tracking have their own.
@@ -92,8 +93,9 @@ class SlamSystem {
   FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
   // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
-  // poses of frames that have none yet. Poses and landmarks are final after it. `should_stop` may be empty;
-  // when it says so, the adjustment ends with what it has. Does nothing after Stop().
+  // poses of frames that have none yet, joins parts of which one goes on where another ends, and smooths the
+  // path. Poses and landmarks are final after it. `should_stop` may be empty; when it says so, the adjustment
+  // ends with what it has. Does nothing after Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -156,7 +158,7 @@ class SlamSystem {
   void Backfill(bool grows, const std::function<bool()>& should_stop);
   // Makes one of parts of the map where frames of one follow those of another.
   void JoinParts(const std::function<bool()>& should_stop);
-  void SmoothPaths();
+  void SmoothPaths(const std::function<bool()>& should_stop);
   std::vector<AnchoredPose> TrackedPoses() const;
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);

@@ -16,6 +16,9 @@ namespace {
 // Keyframes on either side of a border that are looked for from the other.
 constexpr size_t kKeyframes = 4;
 
+// Landmarks by which the scale is known: with each as well as below, to 8%.
+constexpr int kMinCommon = 10;
+
 // By how much the ratio of depths may differ from landmark to landmark, one standard deviation: as well as a
 // depth is known (Sim3Estimate). Else one of the parts has no scale of its own: it drifted, or is on movers.
 constexpr double kMaxScaleSpread = 0.2;
@@ -60,17 +63,20 @@ Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
   Look(known, border.after, border.before, &sightings);
 
   Bridge none;
-  std::vector<double> ratios;
+  // Each landmark once, from the keyframe nearest to the border.
+  std::map<LandmarkId, double> by_landmark;
   for (const Sighting& sighting : sightings)
-    ratios.insert(ratios.end(), sighting.depth_ratios.begin(), sighting.depth_ratios.end());
+    by_landmark.insert(sighting.depth_ratios.begin(), sighting.depth_ratios.end());
+  std::vector<double> ratios;
+  for (const auto& [landmark, ratio] : by_landmark) ratios.push_back(ratio);
   none.common = static_cast<int>(ratios.size());
   {
     const auto map = map_->Read();
     none.keyframe = map->ResolveKeyframe(border.after.reference).keyframe;
     none.neighbour = map->ResolveKeyframe(border.before.reference).keyframe;
   }
-  if (none.common < options_.pnp.min_inliers) {
-    none.reason = fmt::format("{} landmarks are in both parts < {}", none.common, options_.pnp.min_inliers);
+  if (none.common < kMinCommon) {
+    none.reason = fmt::format("{} landmarks are in both parts < {}", none.common, kMinCommon);
     return none;
   }
   const double scale = Percentile(0.5, &ratios);
@@ -189,8 +195,9 @@ BridgeFinder::Sighting BridgeFinder::SightingOf(KeyframeId id, bool is_after, co
     if (!here.IsValid()) continue;
     const double depth = (keyframe.cam_from_world() * map->landmarks().At(here).position()).z();
     const double depth_there = (frame.cam_from_world * map->landmarks().At(there).position()).z();
-    if (depth > 0 && depth_there > 0)
-      sighting.depth_ratios.push_back(is_after ? depth / depth_there : depth_there / depth);
+    if (!(depth > 0 && depth_there > 0)) continue;
+    sighting.depth_ratios.emplace(is_after ? here : there,
+                                  is_after ? depth / depth_there : depth_there / depth);
   }
   return sighting;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,10 +46,11 @@ class BridgeFinder {
   // A keyframe that has a pose in the other part too.
   struct Sighting {
     Bridge bridge;
-    bool is_after = false;             // the keyframe is in the part of the pose after the border
-    Rigid3 cam_from_there;             // the other part's world
-    double inliers = 0;                // that can be right
-    std::vector<double> depth_ratios;  // after the border over before it, of landmarks in both
+    bool is_after = false;  // the keyframe is in the part of the pose after the border
+    Rigid3 cam_from_there;  // the other part's world
+    double inliers = 0;     // that can be right
+    // After the border over before it, of landmarks in both, by the one after it.
+    std::map<LandmarkId, double> depth_ratios;
   };
 
   // Looks for keyframes of the part of `to`, the nearest in time, from the part of `from`.

@@ -94,6 +94,7 @@ TEST_F(BridgeFinderTest, AFewCommonLandmarksAreEnough) {
   MakeParts(kPoints / 8);
   const Bridge bridge = Find();
   ASSERT_THAT(bridge.reason, IsEmpty());
+  EXPECT_LT(bridge.common, 100);
   EXPECT_NEAR(SecondFromFirst(bridge).scale, kDrift.scale, 0.04);
 }
 
