@@ -110,8 +110,8 @@ nlohmann::ordered_json RowsOf(const RecallOfSequence& sequence) {
 // Of the folder that was named, or of rendered scenes; those until an interrupt.
 std::vector<RecallOfSequence> RunSequences(const RecallArguments& arguments, RunConsole* console) {
   const auto run = [&](const std::string& name, const std::string& folder) {
-    const ExperimentRun run = RunExperiment(arguments, folder, console);
-    return RecallOfSequence{name, RecallByFrame(run), run.recall_before, run.recall_after};
+    const ExperimentRun done = RunExperiment(arguments, folder, console);
+    return RecallOfSequence{name, RecallByFrame(done), done.recall_before, done.recall_after};
   };
   if (std::filesystem::is_directory(arguments.source)) return {run(arguments.source, arguments.source)};
   SceneOptions scene = LoadScene(arguments.source.empty() ? "office" : arguments.source);
