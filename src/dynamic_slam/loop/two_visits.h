@@ -31,13 +31,7 @@ struct TwoVisits {
       }
       map.AddLandmarks(0, kPoints, ids[visit]);
     }
-    map.map.landmarks().ForEach([&](Landmark& landmark) {
-      if (landmark.created_by() == ids[1].back()) landmark.Transform(drift);
-    });
-    for (const KeyframeId id : ids[1]) {
-      Keyframe& keyframe = map.map.keyframes().At(id);
-      keyframe.set_cam_from_world(ToRigid3(ToSim3(keyframe.cam_from_world()) * drift.Inverse()));
-    }
+    map.Drift(ids[1], drift);
   }
 
   LoopResult Close(const LoopOptions& options = {}, const std::function<bool()>& should_stop = {}) {
@@ -68,7 +62,5 @@ struct TwoVisits {
   std::vector<Rigid3> truth;
   std::vector<KeyframeId> ids[2];
 };
-
-inline const Sim3 kDrift{1.25, ExpSo3({0, 0.1, 0.02}), {0.3, 0.1, -0.2}};
 
 }  // namespace dynamic_slam

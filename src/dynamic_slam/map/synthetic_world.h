@@ -7,6 +7,7 @@
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/rolling_shutter.h"
+#include "dynamic_slam/geometry/sim3.h"
 #include "dynamic_slam/geometry/two_view_scene.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
@@ -138,6 +139,17 @@ class SyntheticMap {
     return added;
   }
 
+  // Keyframes, and the landmarks that the last of them made, as they look from a world that has drifted.
+  void Drift(const std::vector<KeyframeId>& keyframes, const Sim3& drifted_from_world) {
+    map.landmarks().ForEach([&](Landmark& landmark) {
+      if (landmark.created_by() == keyframes.back()) landmark.Transform(drifted_from_world);
+    });
+    for (const KeyframeId id : keyframes) {
+      Keyframe& keyframe = map.keyframes().At(id);
+      keyframe.set_cam_from_world(ToRigid3(ToSim3(keyframe.cam_from_world()) * drifted_from_world.Inverse()));
+    }
+  }
+
   // The point that the observed keypoint is the image of.
   uint32_t PointOf(const Observation& observation) const {
     return views[observation.keyframe.value()].points[observation.keypoint];
@@ -150,6 +162,8 @@ class SyntheticMap {
  private:
   SyntheticWorld* world_;
 };
+
+inline const Sim3 kDrift{1.25, ExpSo3({0, 0.1, 0.02}), {0.3, 0.1, -0.2}};
 
 // The camera at (x, 0, 0), looking along z.
 inline Rigid3 SidewaysPose(double x) { return {Eigen::Quaterniond::Identity(), {-x, 0, 0}}; }

@@ -17,8 +17,8 @@ namespace dynamic_slam {
 struct Bridge {
   KeyframeId keyframe, neighbour;  // in either part
   Sim3 keyframe_from_neighbour;    // cameras, each in the map's unit of length about it
-  std::vector<std::pair<uint32_t, LandmarkId>>
-      links;           // keypoints that show landmarks of the neighbour's part
+  // Keypoints of the keyframe that show landmarks of the neighbour's part.
+  std::vector<std::pair<uint32_t, LandmarkId>> links;
   int common = 0;      // landmarks of both parts, by which the scale is known
   std::string reason;  // why it is none; empty when it is one
 };

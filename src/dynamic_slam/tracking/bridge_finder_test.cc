@@ -18,8 +18,6 @@ using testing::SizeIs;
 
 constexpr uint32_t kPoints = 1500;
 
-const Sim3 kDrift{1.25, ExpSo3({0, 0.1, 0.02}), {0.3, 0.1, -0.2}};
-
 // A camera that moves sideways, a frame a second. After six it was lost for a moment, and what follows is a
 // part of the map of its own, with a world and a unit of length of its own.
 class BridgeFinderTest : public testing::Test {
@@ -35,13 +33,7 @@ class BridgeFinderTest : public testing::Test {
         keyframes_[part].push_back(scene_.Add(SidewaysPose(0.1 * (kKeyframes * part + i)), id));
       scene_.AddLandmarks(0, kPoints, keyframes_[part]);
     }
-    scene_.map.landmarks().ForEach([&](Landmark& landmark) {
-      if (landmark.created_by() == keyframes_[1].back()) landmark.Transform(kDrift);
-    });
-    for (const KeyframeId id : keyframes_[1]) {
-      Keyframe& keyframe = scene_.map.keyframes().At(id);
-      keyframe.set_cam_from_world(ToRigid3(ToSim3(keyframe.cam_from_world()) * kDrift.Inverse()));
-    }
+    scene_.Drift(keyframes_[1], kDrift);
   }
 
   KnownPoses Known(double gap_s = 0) const {
