@@ -29,16 +29,21 @@ using Json = nlohmann::ordered_json;
 // a SLAM that follows people errs by 1 to 10%.
 constexpr double kMinCoverage = 0.5, kMaxErrorShare = 0.01;
 
+// Of fewer poses an error says nothing.
+constexpr size_t kFewestCommon = 10;
+
 struct Variant {
   const char* name;
   const char* assignment;  // "": none
 };
 
+constexpr char kDefault[] = "default";
+
 constexpr Variant kVariants[] = {
     {"none", "dynamic.method=none"},
     {"hard boxes", "dynamic.method=boxes"},
     {"paper", "dynamic.method=paper"},
-    {"default", ""},
+    {kDefault, ""},
     {"- motion", "dynamic.motion=false"},
     {"- past views", "dynamic.past_views=false"},
     {"- landmark odds", "dynamic.landmark_odds=false"},
@@ -58,7 +63,10 @@ struct Run {
   std::string variant;
   int number = 1;
   UnitOutcome outcome;
-  std::optional<double> common_rmse_m;  // over the frames that all runs of the source that did not fail have
+  // Over the frames that it and the default's run of that source and number have, and the default's over the
+  // same; all of its own where that is the one, or failed. Infinity: failed. None: the
+  // truth is not known, or next to no frame is in both.
+  std::optional<double> rmse_m, default_rmse_m;
 
   std::optional<double> Figure(const std::vector<std::string>& path) const { return FigureAt(outcome, path); }
   double Coverage() const { return Figure({"coverage_live"}).value_or(0); }
@@ -92,12 +100,13 @@ std::vector<Run> MakeRuns(const AblationArguments& arguments) {
                        .title = fmt::format("{}: {}, run {}", name, variant.name, number),
                        .source = source,
                        .arguments = arguments};
-        // Poses of frames that had none when their turn came say nothing of tracking, nor do smooth ones.
+        // What frames are given after their turn says nothing of tracking.
         unit.arguments.assignments.push_back("backfill=false");
+        unit.arguments.assignments.push_back("refine_poses=false");
         unit.arguments.assignments.push_back("smooth_path=false");
         unit.arguments.assignments.push_back(fmt::format("seed={}", number));
         if (*variant.assignment != 0) unit.arguments.assignments.push_back(variant.assignment);
-        runs.push_back({std::move(unit), variant.name, number, {}, {}});
+        runs.push_back({std::move(unit), variant.name, number, {}, {}, {}});
       }
     }
   }
@@ -105,29 +114,38 @@ std::vector<Run> MakeRuns(const AblationArguments& arguments) {
 }
 
 // An error is only compared over the same frames.
-void CompareOverCommonFrames(const fs::path& out, const std::string& source, std::vector<Run>* runs) {
-  const std::optional<Trajectory> truth = LoadGroundTruth(source);
-  if (!truth.has_value()) return;
-  struct Path {
-    Run* run;
-    Trajectory trajectory;
+void CompareWithDefault(const fs::path& out, const Run& standard, Run* run) {
+  const auto of_all_frames = [](const Run& one) {
+    return one.Failed() ? std::numeric_limits<double>::infinity() : one.Rmse();
   };
-  std::vector<Path> paths;
-  std::set<double> common;
-  for (Run& run : *runs) {
-    if (run.unit.source != source || run.Failed()) continue;
-    paths.push_back({&run, ReadTumTrajectory(out / run.unit.folder / "trajectory.txt")});
+  run->rmse_m = of_all_frames(*run);
+  run->default_rmse_m = of_all_frames(standard);
+  const std::optional<Trajectory> truth = LoadGroundTruth(run->unit.source);
+  if (run == &standard || run->Failed() || standard.Failed() || !truth.has_value()) return;
+  Trajectory own = ReadTumTrajectory(out / run->unit.folder / "trajectory.txt");
+  Trajectory others = ReadTumTrajectory(out / standard.unit.folder / "trajectory.txt");
+  const auto keep_common = [](const Trajectory& other, Trajectory* trajectory) {
     std::set<double> stamps;
-    for (const StampedPose& pose : paths.back().trajectory) {
-      if (paths.size() == 1 || common.contains(pose.timestamp_s)) stamps.insert(pose.timestamp_s);
-    }
-    common = std::move(stamps);
+    for (const StampedPose& pose : other) stamps.insert(pose.timestamp_s);
+    std::erase_if(*trajectory, [&](const StampedPose& pose) { return !stamps.contains(pose.timestamp_s); });
+  };
+  keep_common(others, &own);
+  keep_common(own, &others);
+  if (own.size() < kFewestCommon) {
+    run->rmse_m = run->default_rmse_m = std::nullopt;
+    return;
   }
-  if (common.size() < 10) return;
-  for (Path& path : paths) {
-    std::erase_if(path.trajectory,
-                  [&](const StampedPose& pose) { return !common.contains(pose.timestamp_s); });
-    path.run->common_rmse_m = CompareWithTruth(*truth, path.trajectory).ape.translation_m.rmse;
+  run->rmse_m = CompareWithTruth(*truth, own).ape.translation_m.rmse;
+  run->default_rmse_m = CompareWithTruth(*truth, others).ape.translation_m.rmse;
+}
+
+void CompareWithDefaults(const fs::path& out, std::vector<Run>* runs) {
+  for (Run& run : *runs) {
+    for (const Run& standard : *runs) {
+      if (standard.variant == kDefault && standard.unit.source == run.unit.source &&
+          standard.number == run.number)
+        CompareWithDefault(out, standard, &run);
+    }
   }
 }
 
@@ -141,7 +159,8 @@ Json ToRows(const std::vector<Run>& runs) {
                     {"ape_m", OrNull(run.Rmse())},
                     {"path_m", OrNull(run.Figure({"frame_errors", "path_m"}))},
                     {"failed", run.Failed()},
-                    {"common_ape_m", OrNull(run.common_rmse_m)},
+                    {"common_ape_m", OrNull(run.rmse_m)},
+                    {"default_ape_m", OrNull(run.default_rmse_m)},
                     {"tracking_ms", 1000 * run.Figure({"tracking_median_s"}).value_or(0)}});
   }
   return rows;
@@ -168,15 +187,21 @@ std::vector<const Run*> OfKind(std::vector<const Run*> runs, const std::string& 
 }
 
 // One that failed is worse than any that did not.
-std::string MedianError(const std::vector<const Run*>& runs) {
+std::string MedianError(const std::vector<const Run*>& runs, std::optional<double> Run::*error) {
   std::vector<double> errors;
   for (const Run* run : runs) {
-    if (run->Failed()) errors.push_back(std::numeric_limits<double>::infinity());
-    if (run->common_rmse_m.has_value()) errors.push_back(*run->common_rmse_m);
+    if ((run->*error).has_value()) errors.push_back(*(run->*error));
   }
   const std::optional<double> median = Median(errors);
   if (!median.has_value()) return "-";
   return std::isfinite(*median) ? fmt::format("{:.4f}", *median) : "failed";
+}
+
+// "0.0109 (0.0103)": with the default's.
+std::string MedianErrors(const std::vector<const Run*>& runs) {
+  const std::string own = MedianError(runs, &Run::rmse_m);
+  if (runs.empty() || runs.front()->variant == kDefault) return own;
+  return fmt::format("{} ({})", own, MedianError(runs, &Run::default_rmse_m));
 }
 
 Table MakeTable(const std::vector<Run>& runs) {
@@ -186,17 +211,19 @@ Table MakeTable(const std::vector<Run>& runs) {
     if (std::count(kinds.begin(), kinds.end(), kind) == 0) kinds.push_back(kind);
   }
   if (kinds.size() == 1) kinds.clear();  // which is all
-  const std::string errors = "APE in common, m";
-  Table table{.title = "Ablation",
-              .note =
-                  "A run failed that has a pose for less than half of the frames, or errs by more than 1% "
-                  "of the path. Errors are over the frames that all other runs of a sequence have; medians.",
-              .columns = {{.name = "variant", .is_text = true},
-                          {.name = "failed"},
-                          {.name = "mean", .group = "coverage"},
-                          {.name = "least", .group = "coverage"},
-                          {.name = "all", .group = errors}},
-              .rows = {}};
+  const std::string errors = "APE (default's), m";
+  Table table{
+      .title = "Ablation",
+      .note =
+          "A run failed that has a pose for less than half of the frames, or errs by more than 1% "
+          "of the path. Errors are medians over the frames that a run and the default's have, in brackets "
+          "the default's.",
+      .columns = {{.name = "variant", .is_text = true},
+                  {.name = "failed"},
+                  {.name = "mean", .group = "coverage"},
+                  {.name = "least", .group = "coverage"},
+                  {.name = "all", .group = errors}},
+      .rows = {}};
   for (const std::string& kind : kinds) table.columns.push_back({.name = kind, .group = errors});
   table.columns.push_back({.name = "worst", .group = errors});
   for (const Variant& variant : kVariants) {
@@ -208,12 +235,12 @@ Table MakeTable(const std::vector<Run>& runs) {
     for (const Run* run : of_variant) {
       failed += run->Failed() ? 1 : 0;
       coverages.push_back(run->Coverage());
-      worst = std::max(worst, run->common_rmse_m);
+      if (!run->Failed()) worst = std::max(worst, run->rmse_m);
     }
     std::vector<std::string> cells = {
         variant.name, fmt::format("{} of {}", failed, of_variant.size()), Percent(Mean(coverages), 1),
-        Percent(*std::min_element(coverages.begin(), coverages.end()), 1), MedianError(of_variant)};
-    for (const std::string& kind : kinds) cells.push_back(MedianError(OfKind(of_variant, kind)));
+        Percent(*std::min_element(coverages.begin(), coverages.end()), 1), MedianErrors(of_variant)};
+    for (const std::string& kind : kinds) cells.push_back(MedianErrors(OfKind(of_variant, kind)));
     cells.push_back(worst.has_value() ? fmt::format("{:.4f}", *worst) : "-");
     table.rows.push_back(std::move(cells));
   }
@@ -230,7 +257,7 @@ void RunAblation(const AblationArguments& arguments, int* exit_code) {
   const std::vector<UnitOutcome> outcomes = RunUnits(out, units, arguments.jobs, &console);
   for (size_t i = 0; i < runs.size(); ++i) runs[i].outcome = outcomes[i];
   std::erase_if(runs, [](const Run& run) { return !run.outcome.figures.has_value(); });
-  for (const std::string& source : arguments.sources) CompareOverCommonFrames(out, source, &runs);
+  CompareWithDefaults(out, &runs);
   const Json rows = ToRows(runs);
   WriteRows(out, "ablation_runs", rows);
   const Table table = MakeTable(runs);

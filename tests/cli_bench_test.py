@@ -8,6 +8,8 @@ import sys
 import tempfile
 import unittest
 
+import horn
+
 PROGRAM = ""
 FRAMES = 60
 
@@ -40,6 +42,9 @@ class CliBenchTest(unittest.TestCase):
         with open(os.path.join(*path), "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
 
+    def trajectory(self, out, variant, row):
+        return horn.read_tum(os.path.join(out, "room", variant, str(row["run"]), "trajectory.txt"))
+
     def test_ablation_compares_over_common_frames(self):
         boxes = os.path.join(self.shared, "boxes.csv")  # a person in the right half of each image
         stamps = [line.split()[0] for line in read(self.room, "rgb.txt").splitlines() if not line.startswith("#")]
@@ -59,11 +64,24 @@ class CliBenchTest(unittest.TestCase):
         for row in rows:
             self.assertEqual(row["failed"], row["coverage"] < 0.5 or row["ape_m"] > 0.01 * row["path_m"])
             self.assertEqual(row["common_ape_m"] is None, row["failed"])
-        [none] = [row for row in json.loads(read(out, "tables.json"))[0]["rows"] if row["variant"] == "none"]
-        self.assertEqual(none["failed"], "0 of 2")
-        errors = [row["common_ape_m"] for row in rows if row["variant"] == "none"]
-        self.assertAlmostEqual(float(none["APE in common, m: all"]), sum(errors) / 2, delta=6e-5)
-        self.assertAlmostEqual(float(none["APE in common, m: worst"]), max(errors), delta=6e-5)
+        table = {row["variant"]: row for row in json.loads(read(out, "tables.json"))[0]["rows"]}
+        self.assertEqual(table["none"]["failed"], "0 of 2")
+        truth = horn.read_tum(os.path.join(self.room, "groundtruth.txt"))
+        of_none, of_default = ([row for row in rows if row["variant"] == name] for name in ["none", "default"])
+        for mine, its in zip(of_none, of_default):
+            self.assertEqual(its["common_ape_m"], its["ape_m"])
+            common = {pose[0] for pose in self.trajectory(out, "none", mine)}
+            common &= {pose[0] for pose in self.trajectory(out, "default", its)}
+            for path, row, error in [("none", mine, mine["common_ape_m"]), ("default", its, mine["default_ape_m"])]:
+                poses = [pose for pose in self.trajectory(out, path, row) if pose[0] in common]
+                pairs, _ = horn.align(horn.match(truth, poses))
+                self.assertAlmostEqual(error, horn.rmse(horn.absolute_errors(pairs)), delta=1e-9)
+        cell = table["none"]["APE (default's), m: all"]
+        errors = [sum(row[key] for row in of_none) / 2 for key in ["common_ape_m", "default_ape_m"]]
+        for text, error in zip(cell.rstrip(")").split(" ("), errors):
+            self.assertAlmostEqual(float(text), error, delta=6e-5)
+        self.assertAlmostEqual(float(table["none"]["APE (default's), m: worst"]),
+                               max(row["common_ape_m"] for row in of_none), delta=6e-5)
         # What is done is not done again.
         before = os.path.getmtime(os.path.join(out, "room", "paper", "1", "figures.json"))
         self.bench("ablation", *arguments)
