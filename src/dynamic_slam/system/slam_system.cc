@@ -82,6 +82,9 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
   if (mode_ == RunMode::kOffline && options_.backfill) {
     backfiller_.emplace(camera(), options_.tracker, options_.seed, &map_);
   }
+  if (mode_ == RunMode::kOffline && options_.refine_poses) {
+    refiner_.emplace(camera(), options_.tracker, &map_);
+  }
 }
 
 // Tasks ask the executor what waits, so none may run any more when it goes.
@@ -175,6 +178,7 @@ void SlamSystem::Remember(const FrameResult& result) {
     }
     const AnchoredPose pose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
     tracked_.push_back(TrackedFrame(pose, true));
+    if (refiner_.has_value()) refiner_->Keep(frame, tracking.min_inliers);
   }
   if (!backfiller_.has_value()) return;
   if (!has_pose || tracking.may_be_erased) {
@@ -259,6 +263,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) Backfill(false, should_stop);
+  if (refiner_.has_value() && changes_map) RefinePoses(should_stop);
   if (mode_ == RunMode::kOffline && options_.smooth_path) SmoothPaths(should_stop);
   return bundle;
 }
@@ -299,6 +304,18 @@ void SlamSystem::JoinParts(const std::function<bool()>& should_stop) {
     attempt.reason = bridge.reason;
     FinishLoop(loop_closer_.Join(loop, attempt, epoch, should_stop), start, should_stop);
   }
+}
+
+void SlamSystem::RefinePoses(const std::function<bool()>& should_stop) {
+  std::map<double, AnchoredPose> refined;
+  for (const AnchoredPose& pose : refiner_->Refine(TrackedPoses(), should_stop))
+    refined.emplace(pose.timestamp_s, pose);
+  std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
+  for (TrackedFrame& frame : all) {
+    const auto found = refined.find(frame.timestamp_s);
+    if (found != refined.end()) frame = TrackedFrame(found->second, frame.is_live);
+  }
+  tracked_.Assign(all);
 }
 
 void SlamSystem::SmoothPaths(const std::function<bool()>& should_stop) {
@@ -393,6 +410,7 @@ void SlamSystem::Reset() {
   colour_.release();  // a detector that hangs may still read it
   tracked_.clear();
   if (backfiller_.has_value()) backfiller_->Clear();
+  if (refiner_.has_value()) refiner_->Clear();
   *mapping_report_.Write() = MappingReport();
   *loop_report_.Write() = LoopReport();
   mapped_.Write()->clear();

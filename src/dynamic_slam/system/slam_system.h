@@ -25,6 +25,7 @@
 #include "dynamic_slam/system/system_options.h"
 #include "dynamic_slam/tracking/backfiller.h"
 #include "dynamic_slam/tracking/bridge_finder.h"
+#include "dynamic_slam/tracking/pose_refiner.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
@@ -93,9 +94,9 @@ class SlamSystem {
   FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
   // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
-  // poses of frames that have none yet, joins parts of which one goes on where another ends, and smooths the
-  // path. Poses and landmarks are final after it. `should_stop` may be empty; when it says so, the adjustment
-  // ends with what it has. Does nothing after Stop().
+  // poses of frames that have none yet, joins parts of which one goes on where another ends, tracks all
+  // frames once more, and smooths the path. Poses and landmarks are final after it. `should_stop` may be
+  // empty; when it says so, the adjustment ends with what it has. Does nothing after Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -158,6 +159,7 @@ class SlamSystem {
   void Backfill(bool grows, const std::function<bool()>& should_stop);
   // Makes one of parts of the map where frames of one follow those of another.
   void JoinParts(const std::function<bool()>& should_stop);
+  void RefinePoses(const std::function<bool()>& should_stop);
   void SmoothPaths(const std::function<bool()>& should_stop);
   std::vector<AnchoredPose> TrackedPoses() const;
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
@@ -183,6 +185,7 @@ class SlamSystem {
   std::optional<DetectionStage> detection_;
   FileBackedVector<TrackedFrame> tracked_;  // in the order of time
   std::optional<Backfiller> backfiller_;    // offline, unless it is turned off
+  std::optional<PoseRefiner> refiner_;      // the same
   BridgeFinder bridge_finder_;
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work

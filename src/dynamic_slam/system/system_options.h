@@ -18,6 +18,7 @@ struct SystemOptions {
   bool final_bundle = true;
   bool backfill = true;
   bool backfill_grows_map = true;
+  bool refine_poses = true;
   bool smooth_path = true;
   ImageOptions image;
   DetectionOptions detector;
@@ -42,6 +43,10 @@ struct SystemOptions {
           OptionField{"", 0, 1,
                       "Before the map is finished it grows by such frames, where they show what it does not "
                       "have."});
+    visit("refine_poses", self.refine_poses,
+          OptionField{"", 0, 1,
+                      "Offline: frames are tracked once more in the finished map, which knows more than when "
+                      "their turn came."});
     visit("smooth_path", self.smooth_path,
           OptionField{
               "", 0, 1,

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <set>
 
+#include "dynamic_slam/base/random.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
 
@@ -22,19 +23,12 @@ constexpr double kNextFrame = 1.5;
 }  // namespace
 
 Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map)
-    : options_(options),
-      map_(map),
-      shutter_(camera),
-      localiser_(camera, options, map->Read()->octave_scales(), map),
-      seed_(seed) {}
+    : options_(options), map_(map), finder_(camera, options, map), seed_(seed) {}
 
 void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
   kept_.push_back(
       {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
-  // As they were read: the motion that was expected then is not that of the pose.
-  std::vector<Keypoint>& keypoints = kept_.back().features.keypoints;
-  for (size_t i = 0; i < frame.read_px.size(); ++i)
-    keypoints[i].x = frame.read_px[i].x(), keypoints[i].y = frame.read_px[i].y();
+  kept_.back().features.keypoints = FrameFinder::ReadKeypoints(frame);
   keypoints_ += frame.features.size();
   while (keypoints_ > kMaxKeypoints) {
     keypoints_ -= kept_.front().features.size();
@@ -127,8 +121,8 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, KnownPoses*
     goes_on = !should_stop || !should_stop();
     if (!goes_on) break;
     Frame frame = FrameOf(kept);
-    if (!localiser_.Relocalise(kept.min_inliers, random, &frame).has_value()) continue;
-    const std::optional<AnchoredPose> pose = PlausiblePose(*known, &frame);
+    if (!finder_.localiser().Relocalise(kept.min_inliers, random, &frame).has_value()) continue;
+    const std::optional<AnchoredPose> pose = finder_.PlausiblePose(*known, &frame);
     if (pose.has_value()) with_recognised.Add(*pose);
   }
   const KnownPoses::ByStamp& all = with_recognised.by_stamp();
@@ -148,35 +142,8 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, KnownPoses*
   return goes_on;
 }
 
-void Backfiller::CorrectShutterAt(const KnownPoses& known, const KnownPoses::Guess& guess,
-                                  Frame* frame) const {
-  if (!shutter_.IsRolling()) return;
-  const AnchoredPose* nearest = known.Nearest(frame->timestamp_s);
-  if (nearest == nullptr) return;
-  const auto map = map_->Read();
-  if (map->PartOf(nearest->reference) != map->PartOf(guess.keyframe)) return;
-  const Rigid3 other = map->PoseFromReference(nearest->reference, nearest->cam_from_reference);
-  const SteadyMotion motion =
-      MotionBetween(guess.cam_from_world * other.Inverse(), frame->timestamp_s - nearest->timestamp_s);
-  const double depth = map->MedianDepth(guess.keyframe);
-  shutter_.Move(motion, depth > 0 ? 1 / depth : 0, frame);
-}
-
 Frame Backfiller::FrameOf(const KeptFrame& kept) {
-  Frame frame;
-  frame.id = kept.id;
-  frame.timestamp_s = kept.timestamp_s;
-  frame.features = kept.features;
-  frame.static_probability = kept.static_probability;
-  frame.ClearLandmarks();
-  shutter_.Begin(&frame);
-  return frame;
-}
-
-std::optional<AnchoredPose> Backfiller::PlausiblePose(const KnownPoses& known, Frame* frame) {
-  localiser_.Anchor(frame);
-  const AnchoredPose pose{frame->timestamp_s, frame->reference, frame->cam_from_reference};
-  return known.IsPlausible(pose) ? std::optional(pose) : std::nullopt;
+  return finder_.MakeFrame(kept.id, kept.timestamp_s, kept.features, kept.static_probability);
 }
 
 std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const KnownPoses& known, KeptFrame* kept) {
@@ -189,14 +156,9 @@ std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const KnownPoses& kno
   Frame frame = FrameOf(*kept);
   for (const KnownPoses::Guess& guess : guesses) {
     for (const double search : KnownPoses::kSearches) {
-      CorrectShutterAt(known, guess, &frame);
-      if (localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px,
-                               &frame) < options_.min_motion_inliers)
-        continue;
-      CorrectShutterAt(known, {guess.keyframe, frame.cam_from_world}, &frame);
-      const int inliers = localiser_.TrackLocalMap(options_.local_map_radius_px, &frame);
-      if (localiser_.pose_tracker().RightInliers() < kept->min_inliers) continue;
-      std::optional<AnchoredPose> pose = PlausiblePose(known, &frame);
+      int inliers = 0;
+      if (!finder_.Find(known, guess, search, kept->min_inliers, &frame, &inliers)) continue;
+      std::optional<AnchoredPose> pose = finder_.PlausiblePose(known, &frame);
       if (!pose.has_value()) continue;
       if (map_keyframe_) GrowBy(frame, inliers, &*pose);
       return pose;

@@ -9,12 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "dynamic_slam/base/random.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/tracking/frame_finder.h"
 #include "dynamic_slam/tracking/known_poses.h"
-#include "dynamic_slam/tracking/map_localiser.h"
-#include "dynamic_slam/tracking/shutter_correction.h"
 
 namespace dynamic_slam {
 
@@ -68,8 +66,6 @@ class Backfiller {
     int most_inliers = 0;
   };
 
-  // A rolling shutter: moves the keypoints by how the camera came here from the nearest pose that is known.
-  void CorrectShutterAt(const KnownPoses& known, const KnownPoses::Guess& guess, Frame* frame) const;
   // These add to known and found; false: they were told to stop. From the poses that are known, from
   // neighbour to neighbour.
   bool Spread(const std::function<bool()>& should_stop, KnownPoses* known, std::vector<AnchoredPose>* found);
@@ -84,13 +80,10 @@ class Backfiller {
   Frame FrameOf(const KeptFrame& kept);
   // Makes the frame a keyframe where that is due; its pose hangs on that then.
   void GrowBy(const Frame& frame, int inliers, AnchoredPose* pose);
-  // Anchors the frame at the pose that the localiser found; none if that cannot be.
-  std::optional<AnchoredPose> PlausiblePose(const KnownPoses& known, Frame* frame);
 
   TrackerOptions options_;
   SharedMap* map_;
-  ShutterCorrection shutter_;
-  MapLocaliser localiser_;
+  FrameFinder finder_;
   uint64_t seed_;
   std::deque<KeptFrame> kept_;  // in the order of time
   size_t keypoints_ = 0;        // of all of them

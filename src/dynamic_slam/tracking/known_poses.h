@@ -33,6 +33,8 @@ class KnownPoses {
   bool Contains(double timestamp_s) const { return by_stamp_.contains(timestamp_s); }
   // Nothing is learnt from this one.
   void Add(const AnchoredPose& pose) { by_stamp_.emplace(pose.timestamp_s, pose); }
+  // What was learnt from it stays.
+  void Forget(double timestamp_s) { by_stamp_.erase(timestamp_s); }
   // Those in one part of the map, and what was learnt from all.
   KnownPoses InPart(PartId part) const;
 

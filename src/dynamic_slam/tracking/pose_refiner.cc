@@ -1,0 +1,108 @@
+#include "dynamic_slam/tracking/pose_refiner.h"
+
+#include <optional>
+#include <utility>
+
+#include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/map/static_evidence.h"
+
+namespace dynamic_slam {
+namespace {
+
+constexpr size_t kMaxKeypoints = 8'000'000;
+
+// With so many times the inliers that it needs a pose is not in doubt.
+constexpr double kNoDoubt = 2;
+
+}  // namespace
+
+PoseRefiner::PoseRefiner(const Camera& camera, const TrackerOptions& options, SharedMap* map)
+    : map_(map), finder_(camera, options, map) {}
+
+void PoseRefiner::Keep(const Frame& frame, int min_inliers) {
+  if (keypoints_.size() > kMaxKeypoints) return;
+  const size_t first = keypoints_.size();
+  const std::vector<Keypoint> keypoints = FrameFinder::ReadKeypoints(frame);
+  for (size_t i = 0; i < keypoints.size(); ++i) {
+    const float p = frame.StaticProbability(i);
+    if (p >= kMinStaticProbability) keypoints_.push_back({keypoints[i], p, frame.features.descriptors[i]});
+  }
+  frames_.push_back({frame.id, frame.timestamp_s, first, keypoints_.size() - first, min_inliers});
+}
+
+std::vector<AnchoredPose> PoseRefiner::Refine(std::span<const AnchoredPose> known,
+                                              const std::function<bool()>& should_stop) {
+  DS_TRACE("refine");
+  const KnownPoses before(known, map_);
+  std::vector<Refined> refined(frames_.size());
+  for (const bool is_forward : {true, false}) Pass(is_forward, before, should_stop, &refined);
+  std::vector<AnchoredPose> found;
+  for (const Refined& frame : refined) {
+    if (frame.pose.has_value()) found.push_back(*frame.pose);
+  }
+  return found;
+}
+
+void PoseRefiner::Pass(bool is_forward, const KnownPoses& known, const std::function<bool()>& should_stop,
+                       std::vector<Refined>* refined) {
+  KnownPoses passed = known;
+  for (const KeptFrame& kept : frames_) passed.Forget(kept.timestamp_s);
+  for (size_t k = 0; k < frames_.size(); ++k) {
+    if (should_stop && should_stop()) return;
+    const size_t i = is_forward ? k : frames_.size() - 1 - k;
+    const KeptFrame& kept = frames_[i];
+    const auto pose = known.by_stamp().find(kept.timestamp_s);
+    if (pose == known.by_stamp().end()) continue;
+    Refined& frame = (*refined)[i];
+    if (frame.right_inliers < kNoDoubt * kept.min_inliers) {
+      std::vector<KnownPoses::Guess> guesses = passed.Guesses(kept.timestamp_s);
+      {
+        const AnchoredPose& before = pose->second;
+        const auto map = map_->Read();
+        const PartId part = map->PartOf(before.reference);
+        std::erase_if(guesses,
+                      [&](const KnownPoses::Guess& guess) { return map->PartOf(guess.keyframe) != part; });
+        if (is_forward) {
+          guesses.push_back({map->ResolveKeyframe(before.reference).keyframe,
+                             map->PoseFromReference(before.reference, before.cam_from_reference)});
+        }
+      }
+      Track(kept, guesses, passed, &frame);
+    }
+    if (frame.pose.has_value()) passed.Add(*frame.pose);
+  }
+}
+
+void PoseRefiner::Track(const KeptFrame& kept, std::span<const KnownPoses::Guess> guesses,
+                        const KnownPoses& others, Refined* refined) {
+  if (guesses.empty()) return;
+  Frame frame = Restore(kept);
+  for (const KnownPoses::Guess& guess : guesses) {
+    int inliers = 0;
+    if (!finder_.Find(others, guess, KnownPoses::kSearches[0], kept.min_inliers, &frame, &inliers)) continue;
+    const double right = finder_.localiser().pose_tracker().RightInliers();
+    const std::optional<AnchoredPose> pose = finder_.PlausiblePose(others, &frame);
+    if (!pose.has_value()) continue;
+    if (right > refined->right_inliers) *refined = {pose, right};
+    return;
+  }
+}
+
+Frame PoseRefiner::Restore(const KeptFrame& kept) const {
+  FeatureSet features;
+  std::vector<float> static_probability;
+  for (size_t i = kept.first; i < kept.first + kept.count; ++i) {
+    const KeptKeypoint& keypoint = keypoints_[i];
+    features.keypoints.push_back(keypoint.keypoint);
+    features.descriptors.push_back(keypoint.descriptor);
+    static_probability.push_back(keypoint.static_probability);
+  }
+  return finder_.MakeFrame(kept.id, kept.timestamp_s, std::move(features), std::move(static_probability));
+}
+
+void PoseRefiner::Clear() {
+  frames_.clear();
+  keypoints_.clear();
+}
+
+}  // namespace dynamic_slam

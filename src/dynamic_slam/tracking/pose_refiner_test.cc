@@ -1,0 +1,98 @@
+#include "dynamic_slam/tracking/pose_refiner.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dynamic_slam/map/synthetic_world.h"
+
+namespace dynamic_slam {
+namespace {
+
+using testing::IsEmpty;
+using testing::SizeIs;
+
+// A camera that moves sideways past a map, 1 unit a second, 20 frames a second.
+class PoseRefinerTest : public testing::Test {
+ protected:
+  static constexpr int kMinInliers = 40, kFrames = 31;
+
+  PoseRefinerTest() {
+    for (const double x : {0.0, 0.5, 1.0}) keyframes_.push_back(scene_.Add(SidewaysPose(x)));
+    scene_.AddLandmarks(0, static_cast<uint32_t>(world_.size()), keyframes_);
+  }
+
+  // Frame i at x = StampOf(i), known to be where the camera would be at known_x.
+  void Keep(int i, double known_x, int min_inliers = kMinInliers) {
+    Frame frame = world_.See(SidewaysPose(StampOf(i))).frame;
+    frame.id = FrameId(static_cast<uint32_t>(i));
+    frame.timestamp_s = StampOf(i);
+    frame.cam_from_world = Rigid3();
+    refiner_.Keep(frame, min_inliers);
+    known_.push_back({StampOf(i), keyframes_[0], SidewaysPose(known_x)});
+  }
+  static double StampOf(int i) { return 0.05 * i; }
+  double ErrorOf(const AnchoredPose& pose) const {
+    const Rigid3 cam_from_world = scene_.map.PoseFromReference(pose.reference, pose.cam_from_reference);
+    return (cam_from_world.TargetOriginInSource() - Eigen::Vector3d(pose.timestamp_s, 0, 0)).norm();
+  }
+
+  SyntheticWorld world_{600};
+  SyntheticMap scene_{&world_};
+  std::vector<KeyframeId> keyframes_;
+  std::vector<AnchoredPose> known_;
+  PoseRefiner refiner_{world_.camera(), TrackerOptions(), &scene_.shared_map};
+};
+
+TEST_F(PoseRefinerTest, PosesThatWereInexactAreExactInTheFinishedMap) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i) + (i % 2 == 0 ? 0.02 : -0.02));
+  const std::vector<AnchoredPose> refined = refiner_.Refine(known_, {});
+  ASSERT_THAT(refined, SizeIs(kFrames));
+  for (int i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(refined[static_cast<size_t>(i)].timestamp_s, StampOf(i));
+    EXPECT_LT(ErrorOf(refined[static_cast<size_t>(i)]), 0.005);
+  }
+}
+
+TEST_F(PoseRefinerTest, WhatWentAstrayIsFoundFromTheFramesBefore) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i) + (i >= 20 && i < 25 ? 2 : 0));
+  for (const AnchoredPose& pose : refiner_.Refine(known_, {}))
+    EXPECT_LT(ErrorOf(pose), 0.005) << pose.timestamp_s;
+}
+
+TEST_F(PoseRefinerTest, WhatBeganAstrayIsFoundFromTheFramesAfter) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i) + (i < 5 ? 2 : 0));
+  const std::vector<AnchoredPose> refined = refiner_.Refine(known_, {});
+  EXPECT_THAT(refined, SizeIs(kFrames));
+  for (const AnchoredPose& pose : refined) EXPECT_LT(ErrorOf(pose), 0.005) << pose.timestamp_s;
+}
+
+TEST_F(PoseRefinerTest, AFrameWithoutAPoseOrWithTooFewInliersGetsNone) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i), i == 10 ? 10000 : kMinInliers);
+  known_.erase(known_.begin() + 20);
+  const std::vector<AnchoredPose> refined = refiner_.Refine(known_, {});
+  EXPECT_THAT(refined, SizeIs(kFrames - 2));
+  for (const AnchoredPose& pose : refined) {
+    EXPECT_NE(pose.timestamp_s, StampOf(10));
+    EXPECT_NE(pose.timestamp_s, StampOf(20));
+  }
+}
+
+TEST_F(PoseRefinerTest, KeypointsOfMoversAreNotLookedAt) {
+  Frame frame = world_.See(SidewaysPose(0.5)).frame;
+  frame.timestamp_s = 0.5;
+  frame.static_probability.assign(frame.features.size(), 0.1f);
+  refiner_.Keep(frame, 4);
+  known_ = {{0.5, keyframes_[0], SidewaysPose(0.5)}};
+  EXPECT_THAT(refiner_.Refine(known_, {}), IsEmpty());
+}
+
+TEST_F(PoseRefinerTest, StopsWhenItIsToldAndForgetsWhenCleared) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i));
+  int asked = 0;
+  EXPECT_THAT(refiner_.Refine(known_, [&asked] { return ++asked > 3; }), SizeIs(3));
+  refiner_.Clear();
+  EXPECT_THAT(refiner_.Refine(known_, {}), IsEmpty());
+}
+
+}  // namespace
+}  // namespace dynamic_slam
