@@ -13,7 +13,7 @@
 
 namespace dynamic_slam {
 
-// Tracks frames that have a pose once more when the map is finished: landmarks lie better then than when the
+// Tracks frames once more when the map is finished: landmarks lie better then than when the
 // frames' turn came, and more are known. They are kept in a file.
 class PoseRefiner {
  public:
