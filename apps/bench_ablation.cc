@@ -64,8 +64,8 @@ struct Run {
   int number = 1;
   UnitOutcome outcome;
   // Over the frames that it and the default's run of that source and number have, and the default's over the
-  // same; all of its own where that is the one, or failed. Infinity: failed. None: the
-  // truth is not known, or next to no frame is in both.
+  // same; all of its own where that is the one, or failed. Infinity: failed. None: the truth is not known, or
+  // next to no frame is in both.
   std::optional<double> rmse_m, default_rmse_m;
 
   std::optional<double> Figure(const std::vector<std::string>& path) const { return FigureAt(outcome, path); }
@@ -120,8 +120,9 @@ void CompareWithDefault(const fs::path& out, const Run& standard, Run* run) {
   };
   run->rmse_m = of_all_frames(*run);
   run->default_rmse_m = of_all_frames(standard);
+  if (run == &standard || run->Failed() || standard.Failed()) return;
   const std::optional<Trajectory> truth = LoadGroundTruth(run->unit.source);
-  if (run == &standard || run->Failed() || standard.Failed() || !truth.has_value()) return;
+  if (!truth.has_value()) return;
   Trajectory own = ReadTumTrajectory(out / run->unit.folder / "trajectory.txt");
   Trajectory others = ReadTumTrajectory(out / standard.unit.folder / "trajectory.txt");
   const auto keep_common = [](const Trajectory& other, Trajectory* trajectory) {

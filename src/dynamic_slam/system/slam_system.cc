@@ -179,7 +179,7 @@ void SlamSystem::Remember(const FrameResult& result) {
     const AnchoredPose pose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
     tracked_.push_back(TrackedFrame(pose, true));
   }
-  if (refiner_.has_value()) refiner_->Keep(frame, tracking.min_inliers);
+  if (refiner_.has_value() && !options_.tracker.localise_only) refiner_->Keep(frame, tracking.min_inliers);
   if (!backfiller_.has_value()) return;
   if (!has_pose || tracking.may_be_erased) {
     backfiller_->Keep(frame, tracking.min_inliers, has_pose);

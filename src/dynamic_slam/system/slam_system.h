@@ -185,7 +185,7 @@ class SlamSystem {
   std::optional<DetectionStage> detection_;
   FileBackedVector<TrackedFrame> tracked_;  // in the order of time
   std::optional<Backfiller> backfiller_;    // offline, unless it is turned off
-  std::optional<PoseRefiner> refiner_;      // the same
+  std::optional<PoseRefiner> refiner_;      // offline, unless it is turned off
   BridgeFinder bridge_finder_;
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work

@@ -156,8 +156,8 @@ std::optional<AnchoredPose> Backfiller::FindFromNeighbours(const KnownPoses& kno
   Frame frame = FrameOf(*kept);
   for (const KnownPoses::Guess& guess : guesses) {
     for (const double search : KnownPoses::kSearches) {
-      int inliers = 0;
-      if (!finder_.Find(known, guess, search, kept->min_inliers, &frame, &inliers)) continue;
+      const int inliers = finder_.Find(known, guess, search, kept->min_inliers, &frame);
+      if (inliers == 0) continue;
       std::optional<AnchoredPose> pose = finder_.PlausiblePose(known, &frame);
       if (!pose.has_value()) continue;
       if (map_keyframe_) GrowBy(frame, inliers, &*pose);

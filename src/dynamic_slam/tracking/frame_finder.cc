@@ -29,15 +29,15 @@ Frame FrameFinder::MakeFrame(FrameId id, double timestamp_s, FeatureSet features
   return frame;
 }
 
-bool FrameFinder::Find(const KnownPoses& known, const KnownPoses::Guess& guess, double search,
-                       int min_inliers, Frame* frame, int* inliers) {
+int FrameFinder::Find(const KnownPoses& known, const KnownPoses::Guess& guess, double search, int min_inliers,
+                      Frame* frame) {
   CorrectShutterAt(known, guess, frame);
   if (localiser_.TrackNear(guess.keyframe, guess.cam_from_world, search * options_.motion_radius_px, frame) <
       options_.min_motion_inliers)
-    return false;
+    return 0;
   CorrectShutterAt(known, {guess.keyframe, frame->cam_from_world}, frame);
-  *inliers = localiser_.TrackLocalMap(options_.local_map_radius_px, frame);
-  return localiser_.pose_tracker().RightInliers() >= min_inliers;
+  const int inliers = localiser_.TrackLocalMap(options_.local_map_radius_px, frame);
+  return localiser_.pose_tracker().RightInliers() >= min_inliers ? inliers : 0;
 }
 
 std::optional<AnchoredPose> FrameFinder::PlausiblePose(const KnownPoses& known, Frame* frame) const {

@@ -23,11 +23,11 @@ class FrameFinder {
   Frame MakeFrame(FrameId id, double timestamp_s, FeatureSet features,
                   std::vector<float> static_probability) const;
 
-  // Leaves pose and landmarks in the frame, when there are enough inliers that can be right. search: times
-  // what the motion model looks through. A rolling shutter's keypoints move by how the camera came here from
-  // the nearest pose that is known. *inliers: that were found.
-  bool Find(const KnownPoses& known, const KnownPoses::Guess& guess, double search, int min_inliers,
-            Frame* frame, int* inliers);
+  // Leaves pose and landmarks in the frame, and returns the inliers; 0 when too few of them can be right.
+  // search: times what the motion model looks through. A rolling shutter's keypoints move by how the camera
+  // came here from the nearest pose that is known.
+  int Find(const KnownPoses& known, const KnownPoses::Guess& guess, double search, int min_inliers,
+           Frame* frame);
 
   // The frame's pose, hung on the map; none when the camera cannot have come there from those before and
   // after it.

@@ -78,8 +78,7 @@ void PoseRefiner::Track(const KeptFrame& kept, std::span<const KnownPoses::Guess
   if (guesses.empty()) return;
   Frame frame = Restore(kept);
   for (const KnownPoses::Guess& guess : guesses) {
-    int inliers = 0;
-    if (!finder_.Find(others, guess, KnownPoses::kSearches[0], kept.min_inliers, &frame, &inliers)) continue;
+    if (finder_.Find(others, guess, KnownPoses::kSearches[0], kept.min_inliers, &frame) == 0) continue;
     const double right = finder_.localiser().pose_tracker().RightInliers();
     const std::optional<AnchoredPose> pose = finder_.PlausiblePose(others, &frame);
     if (!pose.has_value()) continue;
