@@ -14,6 +14,7 @@
 #include "bench_units.h"
 #include "cmd_bench.h"
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/eval/paired_comparison.h"
 #include "dynamic_slam/io/trajectory_file.h"
 #include "dynamic_slam/report/table.h"
 #include "dynamic_slam/report/truth_comparison.h"
@@ -187,22 +188,23 @@ std::vector<const Run*> OfKind(std::vector<const Run*> runs, const std::string& 
   return runs;
 }
 
-// One that failed is worse than any that did not.
-std::string MedianError(const std::vector<const Run*>& runs, std::optional<double> Run::*error) {
+// "1.09": the error over the default's, pair by pair; of the default itself, the error.
+std::string ErrorCell(const std::vector<const Run*>& runs) {
   std::vector<double> errors;
+  std::vector<ErrorPair> pairs;
   for (const Run* run : runs) {
-    if ((run->*error).has_value()) errors.push_back(*(run->*error));
+    if (!run->rmse_m.has_value() || !run->default_rmse_m.has_value()) continue;
+    errors.push_back(*run->rmse_m);
+    pairs.push_back({*run->rmse_m, *run->default_rmse_m});
   }
-  const std::optional<double> median = Median(errors);
-  if (!median.has_value()) return "-";
-  return std::isfinite(*median) ? fmt::format("{:.4f}", *median) : "failed";
-}
-
-// "0.0109 (0.0103)": with the default's.
-std::string MedianErrors(const std::vector<const Run*>& runs) {
-  const std::string own = MedianError(runs, &Run::rmse_m);
-  if (runs.empty() || runs.front()->variant == kDefault) return own;
-  return fmt::format("{} ({})", own, MedianError(runs, &Run::default_rmse_m));
+  if (errors.empty()) return "-";
+  const auto print = [](double value, const char* format) {
+    return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "failed";
+  };
+  if (runs.front()->variant == kDefault) return print(*Median(errors), "{:.4f} m");
+  const std::optional<PairedComparison> comparison = ComparePairs(pairs);
+  if (!comparison.has_value()) return "-";
+  return print(comparison->median_ratio, "{:.2f}") + (comparison->IsNoChance() ? "*" : "");
 }
 
 Table MakeTable(const std::vector<Run>& runs) {
@@ -212,13 +214,15 @@ Table MakeTable(const std::vector<Run>& runs) {
     if (std::count(kinds.begin(), kinds.end(), kind) == 0) kinds.push_back(kind);
   }
   if (kinds.size() == 1) kinds.clear();  // which is all
-  const std::string errors = "APE (default's), m";
+  const std::string errors = "APE over the default's";
   Table table{
       .title = "Ablation",
       .note =
           "A run failed that has a pose for less than half of the frames, or errs by more than 1% "
-          "of the path. Errors are medians over the frames that a run and the default's have, in brackets "
-          "the default's.",
+          "of the path. Errors are over the frames that a run and the default's of the same source and "
+          "number "
+          "have, and divided by the default's; medians of the runs. *: so many of them are better, or worse, "
+          "as chance gives in less than one case of twenty (sign test).",
       .columns = {{.name = "variant", .is_text = true},
                   {.name = "failed"},
                   {.name = "mean", .group = "coverage"},
@@ -240,9 +244,9 @@ Table MakeTable(const std::vector<Run>& runs) {
     }
     std::vector<std::string> cells = {
         variant.name, fmt::format("{} of {}", failed, of_variant.size()), Percent(Mean(coverages), 1),
-        Percent(*std::min_element(coverages.begin(), coverages.end()), 1), MedianErrors(of_variant)};
-    for (const std::string& kind : kinds) cells.push_back(MedianErrors(OfKind(of_variant, kind)));
-    cells.push_back(worst.has_value() ? fmt::format("{:.4f}", *worst) : "-");
+        Percent(*std::min_element(coverages.begin(), coverages.end()), 1), ErrorCell(of_variant)};
+    for (const std::string& kind : kinds) cells.push_back(ErrorCell(OfKind(of_variant, kind)));
+    cells.push_back(worst.has_value() ? fmt::format("{:.4f} m", *worst) : "-");
     table.rows.push_back(std::move(cells));
   }
   return table;
