@@ -37,10 +37,12 @@ void FileBackedBlocks::Add() {
   const bool is_in_file = memory != nullptr;
   if (!is_in_file) memory = Map(MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (memory == nullptr) throw std::bad_alloc();
-  if (!blocks_.empty() && blocks_.back().is_in_file) {
-    madvise(blocks_.back().memory, kBlockBytes, MADV_DONTNEED);  // the file has it
-  }
+  if (!blocks_.empty()) Release(blocks_.size() - 1);
   blocks_.push_back({memory, is_in_file});
+}
+
+void FileBackedBlocks::Release(size_t block) const {
+  if (blocks_[block].is_in_file) madvise(blocks_[block].memory, kBlockBytes, MADV_DONTNEED);
 }
 
 std::byte* FileBackedBlocks::MapFromFile() {

@@ -9,8 +9,8 @@
 
 namespace dynamic_slam {
 
-// Blocks of memory whose contents lie in an unnamed file of the system's folder for temporary files, but for the
-// first block. Where no file can be made or the disk is full, blocks stay in memory.
+// Blocks of memory whose contents lie in an unnamed file of the system's folder for temporary files, but for
+// the first block. Where no file can be made or the disk is full, blocks stay in memory.
 class FileBackedBlocks {
  public:
   static constexpr size_t kBlockBytes = size_t{1} << 18;  // a multiple of any page's size
@@ -26,6 +26,8 @@ class FileBackedBlocks {
 
   // The block that was the last takes no memory any more, until it is looked at. Throws std::bad_alloc.
   void Add();
+  // Nor does this one, where the file has it.
+  void Release(size_t block) const;
   void Clear();
 
   size_t size() const { return blocks_.size(); }
@@ -45,8 +47,8 @@ class FileBackedBlocks {
   static constexpr int kNone = -1, kImpossible = -2;
 };
 
-// A vector that grows by an element for each frame of a run that may last for days: memory holds its end only.
-// Elements keep their addresses.
+// A vector that grows by an element for each frame of a run that may last for days: memory holds its end
+// only. Elements keep their addresses.
 template <class T>
 class FileBackedVector {
   static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= alignof(std::max_align_t));
@@ -98,6 +100,12 @@ class FileBackedVector {
     blocks_.Clear();
     size_ = 0;
   }
+  // These `count` elements, and those beside them, take no memory any more, until they are looked at again.
+  void Release(size_t first, size_t count) const {
+    if (count == 0) return;
+    for (size_t block = first / kPerBlock; block <= (first + count - 1) / kPerBlock; ++block)
+      blocks_.Release(block);
+  }
   template <class Range>
   void Assign(const Range& values) {
     clear();
@@ -106,7 +114,9 @@ class FileBackedVector {
 
   size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
-  const T& operator[](size_t index) const { return *std::launder(reinterpret_cast<const T*>(Address(index))); }
+  const T& operator[](size_t index) const {
+    return *std::launder(reinterpret_cast<const T*>(Address(index)));
+  }
   const T& front() const { return (*this)[0]; }
   const T& back() const { return (*this)[size_ - 1]; }
   Iterator begin() const { return {this, 0}; }

@@ -79,6 +79,10 @@ TEST(FileBackedVectorTest, OnlyTheEndIsInMemory) {
   EXPECT_LT(Resident(&vector[2 * kPerBlock]), kBlockKb);
   ExpectNumbered(vector, 4 * kPerBlock + 1);
   EXPECT_GE(Resident(&vector[2 * kPerBlock]), kBlockKb) << "until it is looked at";
+  vector.Release(0, vector.size());
+  EXPECT_EQ(Resident(&vector[2 * kPerBlock]), 0u);
+  ExpectNumbered(vector, 4 * kPerBlock + 1);
+  vector.Release(0, 0);
 }
 
 TEST(FileBackedBlocksTest, WithoutAFolderForTheFileAllStaysInMemory) {

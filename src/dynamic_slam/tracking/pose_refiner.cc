@@ -96,6 +96,7 @@ Frame PoseRefiner::Restore(const KeptFrame& kept) const {
     features.descriptors.push_back(keypoint.descriptor);
     static_probability.push_back(keypoint.static_probability);
   }
+  keypoints_.Release(kept.first, kept.count);
   return finder_.MakeFrame(kept.id, kept.timestamp_s, std::move(features), std::move(static_probability));
 }
 
