@@ -220,9 +220,8 @@ Table MakeTable(const std::vector<Run>& runs) {
       .note =
           "A run failed that has a pose for less than half of the frames, or errs by more than 1% "
           "of the path. Errors are over the frames that a run and the default's of the same source and "
-          "number "
-          "have, and divided by the default's; medians of the runs. *: so many of them are better, or worse, "
-          "as chance gives in less than one case of twenty (sign test).",
+          "number have, and divided by the default's; medians of the runs. *: so many of them are better, "
+          "or worse, as chance gives in less than one case of twenty (sign test).",
       .columns = {{.name = "variant", .is_text = true},
                   {.name = "failed"},
                   {.name = "mean", .group = "coverage"},
