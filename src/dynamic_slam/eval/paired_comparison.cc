@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <utility>
 #include <vector>
@@ -30,7 +29,7 @@ std::optional<PairedComparison> ComparePairs(std::span<const ErrorPair> pairs) {
       if (std::isfinite(pair.own)) ratios.push_back(1);
       continue;
     }
-    ratios.push_back(pair.other > 0 ? pair.own / pair.other : std::numeric_limits<double>::infinity());
+    ratios.push_back(pair.own / pair.other);
     different.insert({pair.own, pair.other});
   }
   if (ratios.empty()) return std::nullopt;

@@ -28,7 +28,7 @@ TEST(PairedComparison, SignTestHasKnownAnswers) {
 }
 
 TEST(PairedComparison, RatiosAreOfEachPair) {
-  // The median of the first is 2, that of the others 4; pair by pair the first is as good or worse.
+  // Their medians are 2 and 4; pair by pair neither is better.
   const std::vector<ErrorPair> pairs = {{1, 1}, {2, 4}, {9, 5}, {4, 2}, {1.5, 7}};
   const std::optional<PairedComparison> comparison = ComparePairs(pairs);
   ASSERT_TRUE(comparison.has_value());

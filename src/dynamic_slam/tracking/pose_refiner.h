@@ -13,8 +13,8 @@
 
 namespace dynamic_slam {
 
-// Tracks frames once more when the map is finished: landmarks lie better then than when the
-// frames' turn came, and more are known. They are kept in a file.
+// Tracks frames once more when the map is finished: landmarks lie better then than when the frames' turn
+// came, and more are known. They are kept in a file.
 class PoseRefiner {
  public:
   PoseRefiner(const Camera& camera, const TrackerOptions& options, SharedMap* map);
