@@ -2,13 +2,16 @@
 // 1,000 features on the same images, in the same process. Absolute times do not transfer between machines;
 // the ratios do, roughly. bench/README.md says how to read them.
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -16,9 +19,11 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
+#include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/options.h"
+#include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/detector_factory.h"
 #include "dynamic_slam/io/frame_source.h"
@@ -31,6 +36,11 @@ namespace {
 
 constexpr int kOrbFeatures = 1000;
 constexpr int kOrbFrameStep = 2;  // every second frame is enough for a median
+
+// What a frame costs because something may move in it: boxes over time, how keypoints move in and around
+// them, and what that says of keypoints and objects.
+constexpr std::string_view kSemanticScopes[] = {"detection/collect", "tracking/flow", "tracking/judge",
+                                                "tracking/watch"};
 
 struct BenchArguments {
   std::string source;
@@ -60,6 +70,48 @@ std::vector<double> TimeOpenCvOrb(const std::string& source, const Camera& camer
     times_ms.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
   }
+}
+
+// Of the frames whose pose was asked of the map, by the events of a trace.
+std::vector<double> SemanticTimes(const nlohmann::json& trace) {
+  struct TracedFrame {
+    double begin_us = 0, semantic_ms = 0;
+    bool has_map = false;
+  };
+  std::vector<TracedFrame> frames;
+  const auto for_each = [&](auto&& visit) {
+    for (const nlohmann::json& event : trace.at("traceEvents")) {
+      if (event.at("ph") == "X") visit(event.at("name").get_ref<const std::string&>(), event);
+    }
+  };
+  for_each([&](const std::string& name, const nlohmann::json& event) {
+    if (name == "frame") frames.push_back({event.at("ts"), 0, false});
+  });
+  for_each([&](const std::string& name, const nlohmann::json& event) {
+    const bool is_semantic = std::ranges::find(kSemanticScopes, name) != std::end(kSemanticScopes);
+    if (!is_semantic && name != "tracking/local map") return;
+    const auto next =
+        std::ranges::upper_bound(frames, event.at("ts").get<double>(), {}, &TracedFrame::begin_us);
+    if (next == frames.begin()) return;
+    TracedFrame& frame = *std::prev(next);
+    if (is_semantic) frame.semantic_ms += 1e-3 * event.at("dur").get<double>();
+    frame.has_map |= !is_semantic;
+  });
+  std::vector<double> times_ms;
+  for (const TracedFrame& frame : frames) {
+    if (frame.has_map) times_ms.push_back(frame.semantic_ms);
+  }
+  return times_ms;
+}
+
+// Ends the trace; it is in no file after that.
+nlohmann::json TakeTrace() {
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / fmt::format("dynamic_slam_track_bench.{}.json", getpid());
+  WriteTrace(file);
+  const nlohmann::json trace = nlohmann::json::parse(std::ifstream(file));
+  std::filesystem::remove(file);
+  return trace;
 }
 
 Camera ChooseCamera(const BenchArguments& arguments, const FrameSource& source) {
@@ -101,7 +153,9 @@ void RunBench(const BenchArguments& arguments) {
   const double orb_before_ms = SummariseTimes(orb_ms).median;
   SlamSystem system(camera, options, arguments.is_realtime ? RunMode::kRealtime : RunMode::kOffline);
   system.SetDetector(MakeDetector(arguments.detector));
+  StartTrace();
   const RunSummary summary = RunSequence(*source, system);
+  const TimeStatistics semantic = SummariseTimes(SemanticTimes(TakeTrace()));
   const std::vector<double> after_ms = TimeOpenCvOrb(arguments.source, camera);
   const double orb_after_ms = SummariseTimes(after_ms).median;
   orb_ms.insert(orb_ms.end(), after_ms.begin(), after_ms.end());
@@ -119,6 +173,7 @@ void RunBench(const BenchArguments& arguments) {
                                          {"one_orb_before_ms", orb_before_ms},
                                          {"one_orb_after_ms", orb_after_ms},
                                          {"tracking_ms", ToJson(summary.tracking_ms, one_orb_ms)},
+                                         {"semantic_ms", ToJson(semantic, one_orb_ms)},
                                          {"mapping_ms", ToJson(summary.mapping_ms, one_orb_ms)}};
     fmt::print("{}\n", json.dump(2));
     return;
@@ -128,6 +183,7 @@ void RunBench(const BenchArguments& arguments) {
   fmt::print("{:<22}{:>8} {:>8} {:>8} {:>8} {:>10}\n", "ms", "median", "mean", "p95", "max", "over ORB");
   Print("one ORB (OpenCV)", orb, one_orb_ms);
   Print("tracking a frame", summary.tracking_ms, one_orb_ms);
+  Print("of it, for what moves", semantic, one_orb_ms);
   Print("mapping a keyframe", summary.mapping_ms, one_orb_ms);
   fmt::print("one ORB before the run {:.2f} ms, after it {:.2f} ms; at most {:.0f} MB of memory\n",
              orb_before_ms, orb_after_ms, summary.peak_rss_mb);
