@@ -8,6 +8,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -72,34 +73,24 @@ std::vector<double> TimeOpenCvOrb(const std::string& source, const Camera& camer
   }
 }
 
-// Of the frames whose pose was asked of the map, by the events of a trace.
+// Of the frames that were looked for in the map, by the events of a trace: those of a frame end before it
+// does.
 std::vector<double> SemanticTimes(const nlohmann::json& trace) {
-  struct TracedFrame {
-    double begin_us = 0, semantic_ms = 0;
-    bool has_map = false;
-  };
-  std::vector<TracedFrame> frames;
-  const auto for_each = [&](auto&& visit) {
-    for (const nlohmann::json& event : trace.at("traceEvents")) {
-      if (event.at("ph") == "X") visit(event.at("name").get_ref<const std::string&>(), event);
-    }
-  };
-  for_each([&](const std::string& name, const nlohmann::json& event) {
-    if (name == "frame") frames.push_back({event.at("ts"), 0, false});
-  });
-  for_each([&](const std::string& name, const nlohmann::json& event) {
-    const bool is_semantic = std::ranges::find(kSemanticScopes, name) != std::end(kSemanticScopes);
-    if (!is_semantic && name != "tracking/local map") return;
-    const auto next =
-        std::ranges::upper_bound(frames, event.at("ts").get<double>(), {}, &TracedFrame::begin_us);
-    if (next == frames.begin()) return;
-    TracedFrame& frame = *std::prev(next);
-    if (is_semantic) frame.semantic_ms += 1e-3 * event.at("dur").get<double>();
-    frame.has_map |= !is_semantic;
-  });
   std::vector<double> times_ms;
-  for (const TracedFrame& frame : frames) {
-    if (frame.has_map) times_ms.push_back(frame.semantic_ms);
+  double semantic_ms = 0;
+  bool has_map = false;
+  for (const nlohmann::json& event : trace.at("traceEvents")) {
+    if (event.at("ph") != "X") continue;
+    const std::string_view name = event.at("name").get_ref<const std::string&>();
+    if (std::ranges::find(kSemanticScopes, name) != std::end(kSemanticScopes)) {
+      semantic_ms += 1e-3 * event.at("dur").get<double>();
+    } else if (name == "tracking/local map") {
+      has_map = true;
+    } else if (name == "frame") {
+      if (has_map) times_ms.push_back(semantic_ms);
+      semantic_ms = 0;
+      has_map = false;
+    }
   }
   return times_ms;
 }
