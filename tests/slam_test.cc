@@ -322,6 +322,21 @@ TEST_F(SystemTest, NothingIsSeenUnderTheMask) {
   });
 }
 
+// Landmarks that were followed from frame to frame until their depth was known, in a view without movers too.
+TEST_F(SystemTest, LandmarksOfSeedsAreAsRightAsOthers) {
+  const Room room = MakeRoom(200);
+  SystemOptions options;
+  const WholeRun without = RunAll(*MakeRoomSource(room), room.options().camera, options);
+  options.tracker.seeds_min_share = 0;
+  const WholeRun with = RunAll(*MakeRoomSource(room), room.options().camera, options);
+  EXPECT_LT(with.summary.mapping.landmarks_created, without.summary.mapping.landmarks_created)
+      << "nothing was left to triangulate of some keypoints";
+  EXPECT_GE(with.summary.Coverage(), without.summary.Coverage());
+  EXPECT_LE(ApeRmse(room.truth(), with.system->FrameTrajectory()),
+            0.005 * PathLength(ToPoseList(room.truth())));
+  EXPECT_THAT(with.system->map().Read()->Validate(), IsEmpty());
+}
+
 TEST_F(SystemTest, MoreKeypointsNeedMoreInliers) {
   const Room room = MakeRoom(1);
   const auto needed = [&](int features, const cv::Mat& image) {

@@ -53,6 +53,7 @@ Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptio
       localiser_(camera, options, octave_scales_, map),
       filter_(camera, dynamic, octave_scales_),
       flow_(camera, octave_scales_),
+      seeds_(camera, octave_scales_),
       seed_(seed),
       random_(seed) {}
 
@@ -174,10 +175,14 @@ void Tracker::AcceptPose() {
   CountVisibility();
   localiser_.Anchor(&frame_);
   velocity_.reset();
-  if (!last_has_pose_) return;
-  velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
-  velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
-  if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
+  if (last_has_pose_) {
+    velocity_ = frame_.cam_from_world * last_.cam_from_world.Inverse();
+    velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
+    if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
+  }
+  const bool is_hidden = options_.seeds_min_share < 1 && share_in_boxes_ >= options_.seeds_min_share;
+  if (!last_has_pose_ || !is_hidden) seeds_.Clear();
+  if (is_hidden) seeds_.Follow(velocity_.value_or(Rigid3()), MedianDepthOfFrame(), frame_);
 }
 
 void Tracker::SetLocaliseOnly(bool localise_only) {
@@ -267,6 +272,7 @@ void Tracker::ErasePart(TrackingResult* result) {
 }
 
 void Tracker::ForgetPose() {
+  seeds_.Clear();
   visibility_.Clear();
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
@@ -300,6 +306,7 @@ void Tracker::RefreshLastFrame() {
   last_.cam_from_world = map->PoseFromReference(last_.reference, last_.cam_from_reference);
   const double unit = map->UnitOf(last_.reference);
   if (velocity_.has_value()) velocity_->translation *= unit / last_.reference_unit;
+  seeds_.Scale(unit / last_.reference_unit);
   last_.reference_unit = unit;
   revision_ = map->revision();
   const Keyframe* keyframe = map->keyframes().Find(last_keyframe_);
@@ -461,6 +468,7 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
       frame_.cam_from_world = map->PoseFromReference(frame_.reference, frame_.cam_from_reference);
     }
     last_keyframe_ = InsertKeyframe(frame_, map.get(), map->keyframes().At(anchor.keyframe).part());
+    seeds_.Plant(last_keyframe_, map.get());
     result->map_epoch = map->epoch();
   }
   last_keyframe_frame_ = frame_.id;
@@ -482,11 +490,7 @@ void Tracker::StartAnewWhenLostForLong(TrackingResult* result) {
   const bool is_small = part.IsValid() && part == start_part_ && keyframes <= options_.small_map_keyframes;
   reason_ = fmt::format("starting again: lost for {} frames; the map of {} keyframes is {}", lost_frames_,
                         keyframes, is_small ? "given up" : "kept");
-  if (is_small) {
-    ErasePart(result);
-  } else {
-    ForgetPose();
-  }
+  is_small ? ErasePart(result) : ForgetPose();
   initializer_.Reset();
 }
 

@@ -14,6 +14,7 @@
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/semantics/frame_objects.h"
+#include "dynamic_slam/tracking/depth_seeds.h"
 #include "dynamic_slam/tracking/dynamic_filter.h"
 #include "dynamic_slam/tracking/initializer.h"
 #include "dynamic_slam/tracking/inlier_limits.h"
@@ -121,6 +122,7 @@ class Tracker {
   MapLocaliser localiser_;
   DynamicFilter filter_;
   KeypointFlow flow_;
+  DepthSeeds seeds_;
   LateJudgement late_judgement_;
   double share_in_boxes_ = 0;       // of the keypoints, those in the boxes of movers
   bool is_starved_ = false;         // boxes leave too few keypoints
