@@ -41,7 +41,7 @@ constexpr int kOrbFrameStep = 2;  // every second frame is enough for a median
 // What a frame costs because something may move in it: boxes over time, how keypoints move in and around
 // them, and what that says of keypoints and objects.
 constexpr std::string_view kSemanticScopes[] = {"detection/collect", "tracking/flow", "tracking/judge",
-                                                "tracking/watch"};
+                                                "tracking/watch", "tracking/seeds"};
 
 struct BenchArguments {
   std::string source;
