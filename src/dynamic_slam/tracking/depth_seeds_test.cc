@@ -90,7 +90,7 @@ TEST_F(DepthSeedsTest, WhatIsLikelyToMoveIsNotFollowed) {
 
 TEST_F(DepthSeedsTest, WhatLeavesItsEpipolarLineIsDropped) {
   int frame = 0;
-  spoil_ = [&frame](SyntheticView* view) {  // everybody on the right sinks, 2 px a frame
+  spoil_ = [&frame](SyntheticView* view) {  // every other point sinks, 2 px a frame
     for (size_t i = 0; i < view->points.size(); ++i) {
       if (view->points[i] % 2 == 0) continue;
       view->frame.features.keypoints[i].y += static_cast<float>(2 * frame);

@@ -180,9 +180,10 @@ void Tracker::AcceptPose() {
     velocity_dt_s_ = frame_.timestamp_s - last_.timestamp_s;
     if (!flow_.motions().empty()) filter_.Watch(flow_, last_, MedianDepthOfFrame(), &frame_);
   }
-  const bool is_hidden = options_.seeds_min_share < 1 && share_in_boxes_ >= options_.seeds_min_share;
-  if (!last_has_pose_ || !is_hidden) seeds_.Clear();
-  if (is_hidden) seeds_.Follow(velocity_.value_or(Rigid3()), MedianDepthOfFrame(), frame_);
+  const bool is_asked = options_.seeds_min_share < 1 && !options_.localise_only;
+  const bool are_due = is_asked && share_in_boxes_ >= options_.seeds_min_share;
+  if (!last_has_pose_ || !are_due) seeds_.Clear();
+  if (are_due) seeds_.Follow(velocity_.value_or(Rigid3()), MedianDepthOfFrame(), frame_);
 }
 
 void Tracker::SetLocaliseOnly(bool localise_only) {
