@@ -22,7 +22,8 @@ std::vector<KeyframeId> WithNeighbours(const Map& map, KeyframeId id) {
 }  // namespace
 
 LoopCloser::LoopCloser(const Camera& camera, const LoopOptions& options, uint64_t seed, SharedMap* map)
-    : options_(options),
+    : camera_(camera),
+      options_(options),
       map_(map),
       detector_(camera, options, map->Read()->octave_scales(), seed),
       fusion_(camera, map->Read()->octave_scales()),
@@ -86,7 +87,7 @@ void LoopCloser::Close(const Loop& loop, const std::function<bool()>& should_sto
       const auto map = map_->Read();
       revision = map->revision();
       joins = is_there(*map) && !is_one_part(*map);
-      if (is_there(*map) && !joins) correction.emplace(*map, loop, options_, loops_);
+      if (is_there(*map) && !joins) correction.emplace(camera_, *map, loop, options_, loops_);
     }
     if (!joins && (!correction.has_value() || !correction->Solve(should_stop))) {
       reason = "the correction was stopped, or failed";

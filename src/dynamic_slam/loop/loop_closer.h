@@ -43,6 +43,7 @@ class LoopCloser {
   void JoinParts(const Loop& loop, Map* map) const;
   int Merge(const Loop& loop, Map* map);
 
+  Camera camera_;
   LoopOptions options_;
   SharedMap* map_;
   LoopDetector detector_;

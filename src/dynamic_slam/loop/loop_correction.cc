@@ -10,18 +10,39 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
+// A landmark with a depth known to this part of it counts half, one with a less certain depth ever less. A
+// pixel at the parallax of 10 degrees is about as much.
+constexpr double kCertainDepth = 0.01;
+
 // Keyframes that follow each other and share nothing keep their place to each other, if nothing speaks
 // against it.
-constexpr double kNoLandmarksWeight = 1;
+constexpr double kNoLandmarksWeight = 1e-3;
 
-// What was verified outweighs what was carried on from keyframe to keyframe.
+// What was verified outweighs all that was carried on to the keyframe from those before it.
 constexpr double kLoopFactor = 10;
+
+// On either side of a loop so many neighbours are tied to the other side as well: the newest keyframe alone
+// may be held by less than what drifted is, and would be torn from its neighbours.
+constexpr size_t kTiedNeighbours = 10;
+
+double Certainty(const Landmark& landmark, const Keyframe& keyframe, double focal_px) {
+  const double depth = (landmark.position() - keyframe.CenterInWorld()).norm();
+  const double ratio = landmark.spread().norm() / (focal_px * kCertainDepth * depth);
+  return 1 / (1 + ratio * ratio);
+}
+
+Sim3 FirstFromSecond(const Map& map, KeyframeId first, KeyframeId second) {
+  return ToSim3(map.keyframes().At(first).cam_from_world() *
+                map.keyframes().At(second).cam_from_world().Inverse());
+}
 
 }  // namespace
 
-LoopCorrection::LoopCorrection(const Map& map, const Loop& loop, const LoopOptions& options,
+LoopCorrection::LoopCorrection(const Camera& camera, const Map& map, const Loop& loop,
+                               const LoopOptions& options,
                                const std::vector<std::pair<KeyframeId, KeyframeId>>& older_loops)
-    : options_(options),
+    : focal_px_(camera.fx),
+      options_(options),
       part_(map.keyframes().At(loop.keyframe).part()),
       node_of_(map.keyframes().CreatedCount(), kNone) {
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
@@ -30,39 +51,72 @@ LoopCorrection::LoopCorrection(const Map& map, const Loop& loop, const LoopOptio
     old_from_world_.push_back(ToSim3(keyframe.cam_from_world()));
     graph_.nodes.push_back({old_from_world_.back(), map.IsOrigin(keyframe.id())});
   });
-  const auto now = [&](KeyframeId first, KeyframeId second) {
-    return ToSim3(map.keyframes().At(first).cam_from_world() *
-                  map.keyframes().At(second).cam_from_world().Inverse());
-  };
   KeyframeId previous;
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
     if (keyframe.part() != part_) return;
-    CovisibleKeyframe parent;
-    for (const CovisibleKeyframe& other : keyframe.BestCovisible(keyframe.covisible().size())) {
-      if (other.id < keyframe.id()) {
-        parent = other;
-        break;
-      }
-    }
-    if (parent.id.IsValid()) {
-      AddEdge(keyframe.id(), parent.id, now(keyframe.id(), parent.id), parent.weight);
-    } else if (previous.IsValid()) {
-      AddEdge(keyframe.id(), previous, now(keyframe.id(), previous), kNoLandmarksWeight);
-    }
-    for (const CovisibleKeyframe& other : keyframe.covisible()) {
-      if (keyframe.id() < other.id || other.id == parent.id || other.weight < options_.min_edge_weight)
-        continue;
-      AddEdge(keyframe.id(), other.id, now(keyframe.id(), other.id), other.weight);
-    }
+    AddKeyframe(map, keyframe, previous);
     previous = keyframe.id();
   });
   for (const auto& [first, second] : older_loops) {
     if (HasNode(first) && HasNode(second)) {
-      AddEdge(first, second, now(first, second), options_.min_inliers);
+      AddEdge(first, second, FirstFromSecond(map, first, second), options_.min_inliers);
     }
   }
-  AddEdge(loop.keyframe, loop.candidate, loop.keyframe_from_candidate,
-          kLoopFactor * static_cast<double>(loop.links.size()));
+  AddLoop(map, loop);
+}
+
+// Ties it to the older ones.
+void LoopCorrection::AddKeyframe(const Map& map, const Keyframe& keyframe, KeyframeId previous) {
+  shared_.assign(node_of_.size(), kNoLandmarksWeight);
+  for (const LandmarkId id : keyframe.landmarks()) {
+    if (!id.IsValid()) continue;
+    const Landmark& landmark = map.landmarks().At(id);
+    const double certainty = Certainty(landmark, keyframe, focal_px_);
+    for (const Observation& observation : landmark.observations()) {
+      shared_[observation.keyframe.value()] += certainty;
+    }
+  }
+  const auto tie = [&](KeyframeId other) {
+    AddEdge(keyframe.id(), other, FirstFromSecond(map, keyframe.id(), other), shared_[other.value()]);
+  };
+  KeyframeId parent;
+  for (const CovisibleKeyframe& other : keyframe.BestCovisible(keyframe.covisible().size())) {
+    if (other.id < keyframe.id()) {
+      parent = other.id;
+      break;
+    }
+  }
+  if (!parent.IsValid()) parent = previous;
+  if (parent.IsValid()) tie(parent);
+  for (const CovisibleKeyframe& other : keyframe.covisible()) {
+    const bool is_older = other.id < keyframe.id() && other.id != parent;
+    if (is_older && other.weight >= options_.min_edge_weight) tie(other.id);
+  }
+}
+
+void LoopCorrection::AddLoop(const Map& map, const Loop& loop) {
+  const uint32_t node = node_of_[loop.keyframe.value()];
+  double weight = 0;
+  for (const PoseGraph::Edge& edge : graph_.edges) {
+    if (edge.first == node || edge.second == node) weight += kLoopFactor * edge.weight;
+  }
+  AddEdge(loop.keyframe, loop.candidate, loop.keyframe_from_candidate, weight);
+  // Who sees as much of both sides lies between them.
+  const auto neighbours = [&](KeyframeId id, KeyframeId opposite) {
+    std::vector<CovisibleKeyframe> found = map.keyframes().At(id).BestCovisible(kTiedNeighbours);
+    std::erase_if(found, [&](const CovisibleKeyframe& other) {
+      return other.id == opposite || 2 * map.keyframes().At(other.id).WeightOf(opposite) > other.weight;
+    });
+    return found;
+  };
+  for (const CovisibleKeyframe& other : neighbours(loop.keyframe, loop.candidate)) {
+    AddEdge(other.id, loop.candidate,
+            FirstFromSecond(map, other.id, loop.keyframe) * loop.keyframe_from_candidate, weight);
+  }
+  for (const CovisibleKeyframe& other : neighbours(loop.candidate, loop.keyframe)) {
+    AddEdge(loop.keyframe, other.id,
+            loop.keyframe_from_candidate * FirstFromSecond(map, loop.candidate, other.id), weight);
+  }
 }
 
 bool LoopCorrection::HasNode(KeyframeId keyframe) const {

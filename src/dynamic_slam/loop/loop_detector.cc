@@ -53,13 +53,6 @@ std::vector<LandmarkId> LandmarksAbout(const Map& map, const Keyframe& keyframe,
   return landmarks;
 }
 
-int WeightOf(const Keyframe& keyframe, KeyframeId other) {
-  for (const CovisibleKeyframe& covisible : keyframe.covisible()) {
-    if (covisible.id == other) return covisible.weight;
-  }
-  return 0;
-}
-
 Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe) {
   return ToSim3(other.cam_from_world() * keyframe.cam_from_world().Inverse());
 }
@@ -144,7 +137,7 @@ std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
   std::vector<Candidate> candidates;
   for (const PlaceMatch& place : places) {
     if (place.keyframe == keyframe.id()) continue;
-    if (WeightOf(keyframe, place.keyframe) >= options_.covisible_weight) {
+    if (keyframe.WeightOf(place.keyframe) >= options_.covisible_weight) {
       best_score = std::max(best_score, place.score);
       continue;
     }

@@ -32,10 +32,13 @@ void Keyframe::SetLandmark(uint32_t keypoint, LandmarkId landmark) {
   landmark_count_ += landmark.IsValid() ? 1 : -1;
 }
 
+int Keyframe::WeightOf(KeyframeId other) const {
+  const auto position = std::ranges::lower_bound(covisible_, other, {}, &CovisibleKeyframe::id);
+  return position != covisible_.end() && position->id == other ? position->weight : 0;
+}
+
 void Keyframe::ChangeWeight(KeyframeId other, int change) {
-  const auto position =
-      std::lower_bound(covisible_.begin(), covisible_.end(), other,
-                       [](const CovisibleKeyframe& entry, KeyframeId id) { return entry.id < id; });
+  const auto position = std::ranges::lower_bound(covisible_, other, {}, &CovisibleKeyframe::id);
   if (position == covisible_.end() || position->id != other) {
     DS_CHECK(change > 0, "keyframe {} other {} change {}", id_.value(), other.value(), change);
     covisible_.insert(position, {other, change});

@@ -82,6 +82,8 @@ class Keyframe {
 
   // Keyframes that share landmarks, by id.
   const std::vector<CovisibleKeyframe>& covisible() const { return covisible_; }
+  // The landmarks that it shares with another one.
+  int WeightOf(KeyframeId other) const;
 
   // At most `count` keyframes with at least `min_weight` shared landmarks, the most shared first. The second
   // form keeps the buffer of *best.
