@@ -50,9 +50,9 @@ constexpr Variant kVariants[] = {
     {"- landmark odds", "dynamic.landmark_odds=false"},
     {"- more features", "dynamic.more_features=false"},
     {"- shield", "dynamic.shield_hidden=false"},
-    {"- depth seeds", "tracker.seeds_min_share=1"},
     {"- compensation", "detector.compensation.method=none"},
     {"- loops", "loop.enabled=false"},
+    {"+ depth seeds", "tracker.seeds_min_share=0.5"},
 };
 
 struct AblationArguments : BenchArguments {

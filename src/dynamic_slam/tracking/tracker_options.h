@@ -94,7 +94,7 @@ struct TrackerOptions {
   int relocalisation_keyframes = 20;
   int restart_after_frames = 15;
   int small_map_keyframes = 5;
-  double seeds_min_share = 0.5;
+  double seeds_min_share = 1;
   bool localise_only = false;
   InitializerOptions initializer;
   KeyframePolicyOptions keyframe;
@@ -142,7 +142,7 @@ struct TrackerOptions {
           OptionField{"", 0, 1,
                       "Where the boxes of movers hold such a part of the keypoints, those of the others that "
                       "show no landmark are followed from frame to frame until their depth is known, and "
-                      "become landmarks then: fewer frames are lost (1: nowhere)."});
+                      "become landmarks then: fewer frames are lost, and more errors stay (1: nowhere)."});
     visit("localise_only", self.localise_only,
           OptionField{
               "", 0, 1,
