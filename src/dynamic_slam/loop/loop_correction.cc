@@ -31,11 +31,6 @@ double Certainty(const Landmark& landmark, const Keyframe& keyframe, double foca
   return 1 / (1 + ratio * ratio);
 }
 
-Sim3 FirstFromSecond(const Map& map, KeyframeId first, KeyframeId second) {
-  return ToSim3(map.keyframes().At(first).cam_from_world() *
-                map.keyframes().At(second).cam_from_world().Inverse());
-}
-
 }  // namespace
 
 LoopCorrection::LoopCorrection(const Camera& camera, const Map& map, const Loop& loop,
@@ -59,7 +54,8 @@ LoopCorrection::LoopCorrection(const Camera& camera, const Map& map, const Loop&
   });
   for (const auto& [first, second] : older_loops) {
     if (HasNode(first) && HasNode(second)) {
-      AddEdge(first, second, FirstFromSecond(map, first, second), options_.min_inliers);
+      AddEdge(first, second, FromKeyframe(map.keyframes().At(first), map.keyframes().At(second)),
+              options_.min_inliers);
     }
   }
   AddLoop(map, loop);
@@ -68,16 +64,15 @@ LoopCorrection::LoopCorrection(const Camera& camera, const Map& map, const Loop&
 // Ties it to the older ones.
 void LoopCorrection::AddKeyframe(const Map& map, const Keyframe& keyframe, KeyframeId previous) {
   shared_.assign(node_of_.size(), kNoLandmarksWeight);
-  for (const LandmarkId id : keyframe.landmarks()) {
-    if (!id.IsValid()) continue;
+  keyframe.ForEachLandmark([&](uint32_t, LandmarkId id) {
     const Landmark& landmark = map.landmarks().At(id);
     const double certainty = Certainty(landmark, keyframe, focal_px_);
     for (const Observation& observation : landmark.observations()) {
       shared_[observation.keyframe.value()] += certainty;
     }
-  }
+  });
   const auto tie = [&](KeyframeId other) {
-    AddEdge(keyframe.id(), other, FirstFromSecond(map, keyframe.id(), other), shared_[other.value()]);
+    AddEdge(keyframe.id(), other, FromKeyframe(keyframe, map.keyframes().At(other)), shared_[other.value()]);
   };
   KeyframeId parent;
   for (const CovisibleKeyframe& other : keyframe.BestCovisible(keyframe.covisible().size())) {
@@ -95,28 +90,25 @@ void LoopCorrection::AddKeyframe(const Map& map, const Keyframe& keyframe, Keyfr
 }
 
 void LoopCorrection::AddLoop(const Map& map, const Loop& loop) {
+  const Keyframe& keyframe = map.keyframes().At(loop.keyframe);
+  const Keyframe& candidate = map.keyframes().At(loop.candidate);
   const uint32_t node = node_of_[loop.keyframe.value()];
   double weight = 0;
   for (const PoseGraph::Edge& edge : graph_.edges) {
     if (edge.first == node || edge.second == node) weight += kLoopFactor * edge.weight;
   }
-  AddEdge(loop.keyframe, loop.candidate, loop.keyframe_from_candidate, weight);
-  // Who sees as much of both sides lies between them.
-  const auto neighbours = [&](KeyframeId id, KeyframeId opposite) {
-    std::vector<CovisibleKeyframe> found = map.keyframes().At(id).BestCovisible(kTiedNeighbours);
-    std::erase_if(found, [&](const CovisibleKeyframe& other) {
-      return other.id == opposite || 2 * map.keyframes().At(other.id).WeightOf(opposite) > other.weight;
-    });
-    return found;
+  AddEdge(keyframe.id(), candidate.id(), loop.keyframe_from_candidate, weight);
+  const auto tie_neighbours = [&](const Keyframe& near, const Keyframe& opposite,
+                                  const Sim3& near_from_opposite) {
+    for (const CovisibleKeyframe& entry : near.BestCovisible(kTiedNeighbours)) {
+      const Keyframe& other = map.keyframes().At(entry.id);
+      // Who sees as much of both sides lies between them.
+      if (entry.id == opposite.id() || 2 * other.WeightOf(opposite.id()) > entry.weight) continue;
+      AddEdge(other.id(), opposite.id(), FromKeyframe(other, near) * near_from_opposite, weight);
+    }
   };
-  for (const CovisibleKeyframe& other : neighbours(loop.keyframe, loop.candidate)) {
-    AddEdge(other.id, loop.candidate,
-            FirstFromSecond(map, other.id, loop.keyframe) * loop.keyframe_from_candidate, weight);
-  }
-  for (const CovisibleKeyframe& other : neighbours(loop.candidate, loop.keyframe)) {
-    AddEdge(loop.keyframe, other.id,
-            loop.keyframe_from_candidate * FirstFromSecond(map, loop.candidate, other.id), weight);
-  }
+  tie_neighbours(keyframe, candidate, loop.keyframe_from_candidate);
+  tie_neighbours(candidate, keyframe, loop.keyframe_from_candidate.Inverse());
 }
 
 bool LoopCorrection::HasNode(KeyframeId keyframe) const {

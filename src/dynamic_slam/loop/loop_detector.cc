@@ -53,10 +53,6 @@ std::vector<LandmarkId> LandmarksAbout(const Map& map, const Keyframe& keyframe,
   return landmarks;
 }
 
-Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe) {
-  return ToSim3(other.cam_from_world() * keyframe.cam_from_world().Inverse());
-}
-
 int UsableKeypoints(const Keyframe& keyframe) {
   int usable = 0;
   for (uint32_t i = 0; i < keyframe.features().size(); ++i) {
@@ -80,6 +76,10 @@ bool IsHidden(const Keyframe& keyframe, const Eigen::Vector2d& px) {
 Eigen::Vector2d Pixel(const Keypoint& keypoint) { return {keypoint.x, keypoint.y}; }
 
 }  // namespace
+
+Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe) {
+  return ToSim3(other.cam_from_world() * keyframe.cam_from_world().Inverse());
+}
 
 std::vector<LandmarkId> LandmarksOfPlace(const Map& map, const Keyframe& keyframe) {
   return LandmarksAbout(map, keyframe, kPlaceKeyframes);

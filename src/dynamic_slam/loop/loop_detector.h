@@ -43,6 +43,9 @@ struct Loop {
   bool has_drifted = true;            // else the map is right, and lacks the links only
 };
 
+// Cameras, in the map's units about them, which are one within a part.
+Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe);
+
 // The landmarks about a keyframe that make a place.
 std::vector<LandmarkId> LandmarksOfPlace(const Map& map, const Keyframe& keyframe);
 

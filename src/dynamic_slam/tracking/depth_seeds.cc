@@ -162,24 +162,26 @@ int DepthSeeds::Plant(KeyframeId id, Map* map) {
            !other->landmarks()[sighting.keypoint].IsValid() &&
            other->StaticProbability(sighting.keypoint) >= kMinStaticProbability;
   };
+  const auto plant = [&](Seed* seed) {
+    const auto end = seed->seen_by.begin() + static_cast<std::ptrdiff_t>(seed->sightings);
+    const auto gone = std::stable_partition(seed->seen_by.begin(), end, is_free);
+    seed->sightings = static_cast<size_t>(gone - seed->seen_by.begin());
+    if (seed->sightings == 0) return false;
+    const Eigen::Vector3d x_in_cam = seed->origin + seed->direction / seed->inverse_depth;
+    const LandmarkId landmark = map->AddLandmark(world_from_cam * x_in_cam, id).id();
+    for (size_t k = 0; k < seed->sightings; ++k)
+      map->Link(seed->seen_by[k].keyframe, seed->seen_by[k].keypoint, landmark);
+    map->Link(id, seed->keypoint, landmark);
+    map->RefreshLandmark(landmark);
+    return true;
+  };
   int planted = 0;
   size_t kept = 0;
   for (Seed& seed : seeds_) {
     if (seed.keypoint != kNone && !keyframe.landmarks()[seed.keypoint].IsValid()) {
-      if (seed.IsKnown()) {
-        const auto end = seed.seen_by.begin() + static_cast<std::ptrdiff_t>(seed.sightings);
-        const auto gone = std::stable_partition(seed.seen_by.begin(), end, is_free);
-        seed.sightings = static_cast<size_t>(gone - seed.seen_by.begin());
-        if (seed.sightings > 0) {
-          const Eigen::Vector3d x_in_cam = seed.origin + seed.direction / seed.inverse_depth;
-          const LandmarkId landmark = map->AddLandmark(world_from_cam * x_in_cam, id).id();
-          for (size_t k = 0; k < seed.sightings; ++k)
-            map->Link(seed.seen_by[k].keyframe, seed.seen_by[k].keypoint, landmark);
-          map->Link(id, seed.keypoint, landmark);
-          map->RefreshLandmark(landmark);
-          ++planted;
-          continue;
-        }
+      if (seed.IsKnown() && plant(&seed)) {
+        ++planted;
+        continue;
       }
       if (seed.sightings < seed.seen_by.size()) seed.seen_by[seed.sightings++] = {id, seed.keypoint};
     }
