@@ -98,17 +98,20 @@ void LoopCorrection::AddLoop(const Map& map, const Loop& loop) {
     if (edge.first == node || edge.second == node) weight += kLoopFactor * edge.weight;
   }
   AddEdge(keyframe.id(), candidate.id(), loop.keyframe_from_candidate, weight);
-  const auto tie_neighbours = [&](const Keyframe& near, const Keyframe& opposite,
-                                  const Sim3& near_from_opposite) {
+  // Who sees as much of both sides lies between them.
+  const auto for_neighbours = [&](const Keyframe& near, const Keyframe& opposite, const auto& tie) {
     for (const CovisibleKeyframe& entry : near.BestCovisible(kTiedNeighbours)) {
       const Keyframe& other = map.keyframes().At(entry.id);
-      // Who sees as much of both sides lies between them.
       if (entry.id == opposite.id() || 2 * other.WeightOf(opposite.id()) > entry.weight) continue;
-      AddEdge(other.id(), opposite.id(), FromKeyframe(other, near) * near_from_opposite, weight);
+      tie(other);
     }
   };
-  tie_neighbours(keyframe, candidate, loop.keyframe_from_candidate);
-  tie_neighbours(candidate, keyframe, loop.keyframe_from_candidate.Inverse());
+  for_neighbours(keyframe, candidate, [&](const Keyframe& other) {
+    AddEdge(other.id(), candidate.id(), FromKeyframe(other, keyframe) * loop.keyframe_from_candidate, weight);
+  });
+  for_neighbours(candidate, keyframe, [&](const Keyframe& other) {
+    AddEdge(keyframe.id(), other.id(), loop.keyframe_from_candidate * FromKeyframe(candidate, other), weight);
+  });
 }
 
 bool LoopCorrection::HasNode(KeyframeId keyframe) const {
