@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -113,6 +114,21 @@ class KeypointGrid {
 #endif
   }
 
+  // The lanes whose bits are set, in their order, before the others.
+  __attribute__((always_inline)) static Flags MovedToFront(const Flags& lanes, unsigned bits) {
+    static constexpr Flags kFrom[1u << kLanes] = {
+        {0, 1, 2, 3}, {0, 1, 2, 3}, {1, 0, 2, 3}, {0, 1, 2, 3}, {2, 0, 1, 3}, {0, 2, 1, 3},
+        {1, 2, 0, 3}, {0, 1, 2, 3}, {3, 0, 1, 2}, {0, 3, 1, 2}, {1, 3, 0, 2}, {0, 1, 3, 2},
+        {2, 3, 0, 1}, {0, 2, 3, 1}, {1, 2, 3, 0}, {0, 1, 2, 3},
+    };
+#ifdef __clang__
+    const Flags& from = kFrom[bits];
+    return {lanes[from[0]], lanes[from[1]], lanes[from[2]], lanes[from[3]]};
+#else
+    return __builtin_shuffle(lanes, kFrom[bits]);
+#endif
+  }
+
   // Of the keypoints in the rows of cells that touch min_y to max_y, and there in columns_of_row(row), those
   // of which is_inside(x, y, octave) tells -1; it is asked about kLanes of them at a time.
   template <class ColumnsOfRow, class IsInside, class Fn>
@@ -139,10 +155,9 @@ class KeypointGrid {
         const Flags inside = is_inside(Load<Lanes>(x_, i), Load<Lanes>(y_, i), Load<Flags>(octave_, i)) &
                              (kSteps < static_cast<int32_t>(end - i));
         const unsigned bits = Bits(inside);
-        for (uint32_t k = 0; k < kLanes; ++k) {
-          found[count] = index_[i + k];
-          count += bits >> k & 1;
-        }
+        const Flags first = MovedToFront(Load<Flags>(index_, i), bits);
+        std::memcpy(found + count, &first, sizeof(first));
+        count += static_cast<unsigned>(std::popcount(bits));
       }
     }
     for (size_t i = 0; i < count; ++i) fn(found[i]);
