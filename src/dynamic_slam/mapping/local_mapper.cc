@@ -68,20 +68,24 @@ int LocalMapper::MergeTwins(const std::function<bool()>& should_stop) {
   std::vector<KeyframeId> keyframes;
   map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) { keyframes.push_back(keyframe.id()); });
   int merged = 0;
+  std::vector<KeyframeId> around;
   std::vector<LandmarkId> landmarks;
   for (const KeyframeId target : keyframes) {
     if (should_stop && should_stop()) break;
     const auto map = map_->Write();
-    landmarks.clear();
-    const auto add = [&](KeyframeId id) {
-      map->keyframes().At(id).ForEachLandmark(
-          [&](uint32_t, LandmarkId landmark) { landmarks.push_back(landmark); });
-    };
+    around.clear();
     for (const CovisibleKeyframe& neighbour : map->keyframes().At(target).BestCovisible(kTwinNeighbours)) {
-      add(neighbour.id);
+      around.push_back(neighbour.id);
       for (const CovisibleKeyframe& next :
            map->keyframes().At(neighbour.id).BestCovisible(kTwinNextNeighbours))
-        add(next.id);
+        around.push_back(next.id);
+    }
+    std::sort(around.begin(), around.end());
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    landmarks.clear();
+    for (const KeyframeId id : around) {
+      map->keyframes().At(id).ForEachLandmark(
+          [&](uint32_t, LandmarkId landmark) { landmarks.push_back(landmark); });
     }
     std::sort(landmarks.begin(), landmarks.end());
     landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -35,9 +36,12 @@ struct Row {
   double u, v, inverse_sigma, weight;
 };
 
+// Always inlined: a function of its own would be compiled for the plain processor only (base/dispatch.h).
+
 // block -= y^T w, of two couplings.
-inline void SubtractProduct(const double* __restrict y, const double* __restrict w,
-                            double* __restrict block) {
+__attribute__((always_inline)) inline void SubtractProduct(const double* __restrict y,
+                                                           const double* __restrict w,
+                                                           double* __restrict block) {
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < kRow; ++j) {
       block[i * kRow + j] -= y[i] * w[j] + y[kRow + i] * w[kRow + j] + y[2 * kRow + i] * w[2 * kRow + j];
@@ -45,10 +49,24 @@ inline void SubtractProduct(const double* __restrict y, const double* __restrict
   }
 }
 
-// For one point: reduces the blocks of every pair of its poses, which are in ascending order.
+// y = inverse * w, of a coupling.
+__attribute__((always_inline)) inline void Scale(const Eigen::Matrix3d& inverse, const double* __restrict w,
+                                                 double* __restrict y) {
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < kRow; ++c) {
+      y[r * kRow + c] = inverse(r, 0) * w[c] + inverse(r, 1) * w[kRow + c] + inverse(r, 2) * w[2 * kRow + c];
+    }
+  }
+}
+
+// For one point, of which `inverse` is the inverse Hessian: reduces the blocks of every pair of its poses,
+// which are in ascending order. scaled: room for as many couplings.
 DS_DISPATCH_AVX2
-void ReducePairs(const double* scaled, const double* couplings, const uint32_t* slots, uint32_t count,
-                 uint32_t poses, double* blocks) {
+void ReducePairs(const Eigen::Matrix3d& inverse, const double* couplings, const uint32_t* slots,
+                 uint32_t count, uint32_t poses, double* scaled, double* blocks) {
+  for (uint32_t k = 0; k < count; ++k) {
+    Scale(inverse, couplings + k * kCouplingSize, scaled + k * kCouplingSize);
+  }
   for (uint32_t a = 0; a < count; ++a) {
     for (uint32_t b = a; b < count; ++b) {
       SubtractProduct(scaled + a * kCouplingSize, couplings + b * kCouplingSize,
@@ -95,7 +113,7 @@ class DenseSchur {
   const Camera& camera_;
   const BundleSolverOptions& options_;
   BundleProblem* problem_;
-  std::vector<Row> rows_;        // by point
+  std::vector<Row> rows_;        // by point, there by slot: those of fixed poses are the last
   std::vector<uint32_t> begin_;  // of each point's rows, and the end
   uint32_t free_poses_ = 0;
   std::vector<uint32_t> pose_of_slot_;
@@ -103,16 +121,17 @@ class DenseSchur {
   std::vector<PoseValue> poses_, trial_poses_;
   std::vector<Eigen::Vector3d> points_, trial_points_;
 
-  // The normal equations: of poses, of points, and what couples them, a 3 x 6 for each row.
+  // The normal equations: of poses, of points, and what couples them, a 3 x 6 for each row of a free point
+  // and a free pose.
   std::vector<double> pose_hessians_;
   Eigen::VectorXd pose_gradient_;
   std::vector<PointSystem> point_systems_;
-  std::vector<double> couplings_;
+  std::vector<uint32_t> coupling_begin_;  // of each point's couplings, and the end
+  std::vector<uint32_t> slots_;           // of each coupling
+  std::unique_ptr<double[]> couplings_;
 
   std::vector<Eigen::Matrix3d> inverse_hessians_;  // of the damped points
   std::vector<double> blocks_, scaled_;
-  std::vector<uint32_t> slots_;
-  std::vector<double> gathered_;
   Eigen::VectorXd step_poses_;
   std::vector<Eigen::Vector3d> step_points_;
 };
@@ -160,7 +179,17 @@ DenseSchur::DenseSchur(const Camera& camera, const BundleSolverOptions& options,
   point_systems_.resize(points);
   inverse_hessians_.resize(points);
   step_points_.resize(points);
-  couplings_.resize(rows_.size() * kCouplingSize);
+  size_t most_couplings = 0;
+  coupling_begin_.push_back(0);
+  for (size_t i = 0; i < points; ++i) {
+    for (uint32_t k = begin_[i]; IsFreePoint(i) && k < begin_[i + 1] && rows_[k].slot != kFixed; ++k) {
+      slots_.push_back(rows_[k].slot);
+    }
+    most_couplings = std::max(most_couplings, slots_.size() - coupling_begin_.back());
+    coupling_begin_.push_back(static_cast<uint32_t>(slots_.size()));
+  }
+  couplings_ = std::make_unique_for_overwrite<double[]>(slots_.size() * kCouplingSize);
+  scaled_.resize(most_couplings * kCouplingSize);
   blocks_.resize(static_cast<size_t>(free_poses_) * free_poses_ * kPoseBlock);
 }
 
@@ -228,7 +257,7 @@ void DenseSchur::Linearise() {
       hessian.noalias() += J_pose.transpose() * weighted_pose;
       pose_gradient_.segment<6>(6 * row.slot).noalias() += weighted_pose.transpose() * residual;
       if (!is_free) continue;
-      double* coupling = &couplings_[static_cast<size_t>(k) * kCouplingSize];
+      double* coupling = &couplings_[size_t{coupling_begin_[i] + (k - begin_[i])} * kCouplingSize];
       for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 6; ++c) {
           coupling[r * kRow + c] = weighted(0, r) * J_pose(0, c) + weighted(1, r) * J_pose(1, c);
@@ -254,26 +283,16 @@ bool DenseSchur::Solve(double radius) {
     const Eigen::Matrix3d& inverse = inverse_hessians_[i];
     const Eigen::Vector3d shift = inverse * point_systems_[i].gradient;
 
-    slots_.clear();
-    gathered_.clear();
-    scaled_.clear();
-    for (uint32_t k = begin_[i]; k < begin_[i + 1]; ++k) {
-      if (rows_[k].slot == kFixed) continue;
-      slots_.push_back(rows_[k].slot);
-      const double* w = &couplings_[static_cast<size_t>(k) * kCouplingSize];
-      gathered_.insert(gathered_.end(), w, w + kCouplingSize);
-      for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < kRow; ++c) {
-          scaled_.push_back(inverse(r, 0) * w[c] + inverse(r, 1) * w[kRow + c] +
-                            inverse(r, 2) * w[2 * kRow + c]);
-        }
-      }
+    const uint32_t count = coupling_begin_[i + 1] - coupling_begin_[i];
+    const double* couplings = couplings_.get() + size_t{coupling_begin_[i]} * kCouplingSize;
+    const uint32_t* slots = slots_.data() + coupling_begin_[i];
+    for (uint32_t k = 0; k < count; ++k) {
+      const double* w = couplings + k * kCouplingSize;
       for (int c = 0; c < 6; ++c) {
-        right[6 * rows_[k].slot + c] += w[c] * shift[0] + w[kRow + c] * shift[1] + w[2 * kRow + c] * shift[2];
+        right[6 * slots[k] + c] += w[c] * shift[0] + w[kRow + c] * shift[1] + w[2 * kRow + c] * shift[2];
       }
     }
-    ReducePairs(scaled_.data(), gathered_.data(), slots_.data(), static_cast<uint32_t>(slots_.size()),
-                free_poses_, blocks_.data());
+    ReducePairs(inverse, couplings, slots, count, free_poses_, scaled_.data(), blocks_.data());
   }
   if (free_poses_ > 0) {
     const Eigen::Index size = 6 * static_cast<Eigen::Index>(free_poses_);
@@ -300,10 +319,9 @@ bool DenseSchur::Solve(double radius) {
     step_points_[i].setZero();
     if (!IsFreePoint(i)) continue;
     Eigen::Vector3d rest = -point_systems_[i].gradient;
-    for (uint32_t k = begin_[i]; k < begin_[i + 1]; ++k) {
-      if (rows_[k].slot == kFixed) continue;
-      const double* w = &couplings_[static_cast<size_t>(k) * kCouplingSize];
-      const double* step = &step_poses_[6 * rows_[k].slot];
+    for (uint32_t k = coupling_begin_[i]; k < coupling_begin_[i + 1]; ++k) {
+      const double* w = &couplings_[size_t{k} * kCouplingSize];
+      const double* step = &step_poses_[6 * slots_[k]];
       for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 6; ++c) rest[r] -= w[r * kRow + c] * step[c];
       }
