@@ -53,9 +53,9 @@ class PastViews {
   void Add(const Frame& frame);
   void Clear() { count_ = 0; }
 
-  // For each keypoint of the frame, which has a pose, the log-odds of being at rest that the views and its
-  // neighbours in the image give; 0 where nothing is known. nearest_depth: nothing at rest is nearer. Valid
-  // until the next call.
+  // For each keypoint of the frame, which has a pose, the log-odds of being at rest that one of the views,
+  // the three ages in turn, and its neighbours in the image give; 0 where nothing is known. nearest_depth:
+  // nothing at rest is nearer. Valid until the next call.
   std::span<const float> Judge(const Frame& frame, std::span<const Object> objects, double nearest_depth);
 
  private:

@@ -1,5 +1,7 @@
 #include "dynamic_slam/tracking/past_views.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/random.h"
@@ -11,7 +13,7 @@ namespace {
 constexpr double kDepth = 3;           // of the wall, m
 constexpr double kCameraStep = 0.004;  // to the right, m a frame: the wall moves by 0.67 px to the left
 constexpr double kPersonStep_px = 2;   // to the right: less than the noise of corners tells in one frame
-constexpr int kFrames = 7;
+constexpr int kFrames = 6;             // the last one asks the oldest view
 
 // A camera that moves slowly past a wall, and somebody in a box who walks the other way: a grid of keypoints,
 // of which those in the box belong in turn to the person and to the wall behind.
@@ -90,6 +92,22 @@ TEST_F(PastViewsTest, TellWhoWalksSlowlyFromTheWallBehind) {
   }
   EXPECT_GT(wall, 5);
   EXPECT_GT(person, 5);
+}
+
+TEST_F(PastViewsTest, AskEachOfTheThreeAgesInTurn) {
+  // Only the oldest view is from so long ago that who moves so slowly is apart from the wall.
+  constexpr double kSlowStep_px = 1.3;
+  ShiftHistory shifts;
+  int tell = 0;
+  for (uint32_t id = 0; id < kFrames + 3; ++id) {
+    const Frame frame = MakeFrame(id, kSlowStep_px);
+    if (id > 0) shifts.Add({kSlowStep_px, 0});
+    const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
+    const std::span<const float> evidence = views_.Judge(frame, objects, 0.3 * kDepth);
+    if (id >= kFrames) tell += std::ranges::any_of(evidence, [](float e) { return e != 0; });
+    views_.Add(frame);
+  }
+  EXPECT_EQ(tell, 1);
 }
 
 TEST_F(PastViewsTest, SayNothingOfWhatIsInNoBox) {
