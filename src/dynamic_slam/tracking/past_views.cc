@@ -93,28 +93,11 @@ std::span<const float> PastViews::Judge(const Frame& frame, std::span<const Obje
                                         double nearest_depth) {
   objects = objects.first(std::min(objects.size(), kMaxObjects));
   evidence_.assign(frame.features.size(), 0.0f);
-  is_told_.assign(frame.features.size(), 0);
   ForgetUnlessNext(frame);
-  FindAsked(frame, objects);
   const double age_s = kAges_s[frame.id.value() % std::size(kAges_s)];
   if (const View* view = FromBefore(frame, age_s)) Ask(*view, frame, objects, nearest_depth);
   ShareWithNeighbours(frame);
   return evidence_;
-}
-
-void PastViews::FindAsked(const Frame& frame, std::span<const Object> objects) {
-  asked_.clear();
-  for (uint32_t i = 0; i < frame.features.size(); ++i) {
-    const Keypoint& keypoint = frame.features.keypoints[i];
-    const double outline_px = kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)];
-    uint64_t boxes = 0;
-    for (size_t k = 0; k < objects.size(); ++k) {
-      const bool is_in =
-          objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y, objects[k].margin_px + outline_px);
-      boxes |= uint64_t{is_in} << k;
-    }
-    if (boxes != 0) asked_.push_back({i, boxes});
-  }
 }
 
 void PastViews::Ask(const View& view, const Frame& frame, std::span<const Object> objects,
@@ -128,11 +111,18 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const Object
   std::array<int, kMaxObjects> at_rest{}, with_object{};
   std::array<std::optional<Eigen::Vector2d>, kMaxObjects> shifts_px;
   for (size_t k = 0; k < objects.size(); ++k) shifts_px[k] = objects[k].shifts->Sum(steps);
-  for (const auto& [i, boxes] : asked_) {
+  for (size_t i = 0; i < n; ++i) {
     const Keypoint& keypoint = frame.features.keypoints[i];
+    const double scale = octave_scales_[static_cast<size_t>(keypoint.octave)];
+    uint64_t boxes = 0;  // bits: those that it is in
+    for (size_t k = 0; k < objects.size(); ++k) {
+      const bool is_in = objects[k].box.Contains(keypoint.raw_x, keypoint.raw_y,
+                                                 objects[k].margin_px + kCornerRadius * scale);
+      boxes |= uint64_t{is_in} << k;
+    }
+    if (boxes == 0) continue;
     const Descriptor& descriptor = frame.features.descriptors[i];
     const Eigen::Vector2d px(keypoint.x, keypoint.y);
-    const double scale = octave_scales_[static_cast<size_t>(keypoint.octave)];
     const double radius_px = kGate * std::numbers::sqrt2 * scale;
     // At rest it was on the epipolar line between infinity and the nearest depth, or where its landmark is.
     const Eigen::Vector3d far = rotation * camera_.Unproject(px);
@@ -179,9 +169,7 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const Object
     const bool is_told = looks_[i] > 0   ? (carriers_[i] & ~believed) == 0
                          : looks_[i] < 0 ? (carriers_[i] & believed) != 0
                                          : false;
-    if (!is_told) continue;
-    evidence_[i] = looks_[i] > 0 ? kAtRest : -kWithObject;
-    is_told_[i] = 1;
+    if (is_told) evidence_[i] = looks_[i] > 0 ? kAtRest : -kWithObject;
   }
 }
 
@@ -204,7 +192,7 @@ void PastViews::ShareWithNeighbours(const Frame& frame) {
   const int octaves = static_cast<int>(octave_scales_.size());
   // From those that know to those around them, as few know.
   for (uint32_t i = 0; i < n; ++i) {
-    if (is_told_[i] == 0) continue;
+    if (evidence_[i] == 0) continue;
     const Keypoint& keypoint = frame.features.keypoints[i];
     frame.grid.ForEachInWindow(keypoint.x, keypoint.y, kNeighbourRadius_px, 0, octaves, [&](uint32_t j) {
       if (j == i) return;

@@ -73,7 +73,6 @@ class PastViews {
 
   void ForgetUnlessNext(const Frame& frame);
   const View* FromBefore(const Frame& frame, double age_s) const;
-  void FindAsked(const Frame& frame, std::span<const Object> objects);
   void Ask(const View& view, const Frame& frame, std::span<const Object> objects, double nearest_depth);
   void ShareWithNeighbours(const Frame& frame);
 
@@ -82,18 +81,10 @@ class PastViews {
   std::vector<View> views_;  // the first count_, the oldest first; the others are kept for their memory
   size_t count_ = 0;
 
-  // The keypoints in boxes, and in which: bits.
-  struct Asked {
-    uint32_t keypoint;
-    uint64_t boxes;
-  };
-  std::vector<Asked> asked_;
-
   // Of each keypoint.
   std::vector<float> evidence_, neighbours_sum_;
-  std::vector<int> neighbours_;  // that know something
-  std::vector<uint8_t> is_told_;
-  std::vector<int8_t> looks_;       // in the view in hand: 1 at rest, -1 with an object, 0 neither
+  std::vector<int> neighbours_;     // that know something
+  std::vector<int8_t> looks_;       // in the view: 1 at rest, -1 with an object, 0 neither
   std::vector<uint64_t> carriers_;  // bits: the objects whose boxes it is in
 };
 
