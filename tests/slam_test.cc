@@ -213,6 +213,35 @@ TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
   EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
 }
 
+TEST_F(SystemTest, AFoundPlaceThatTheNextImageDoesNotConfirmIsWithdrawn) {
+  const Room room = MakeRoom(125), other = MakeRoom(10, 2);
+  const std::vector<cv::Mat> images =
+      Join(Join(Join(Frames(room, 0, 80), Frames(other, 0, 5)), Frames(room, 85, 86)),
+           Join(Frames(other, 5, 10), Frames(room, 91, 125)));
+  for (const bool backfills : {false, true}) {
+    ImageSource source(images);
+    SystemOptions options;
+    options.backfill = backfills;
+    const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+    const RunSummary& summary = run.summary;
+    EXPECT_EQ(summary.frames[85].state, TrackingState::kTracking) << summary.ReasonOf(85);
+    EXPECT_THAT(summary.ReasonOf(86), HasSubstr("withdrawn"));
+    EXPECT_THAT(summary.ReasonOf(91), HasSubstr("found again"));
+    EXPECT_EQ(summary.frames[92].state, TrackingState::kTracking) << summary.ReasonOf(92);
+    EXPECT_EQ(summary.lost_count, 2);
+    const auto has_pose_at = [](const Trajectory& trajectory, double timestamp_s) {
+      return std::any_of(trajectory.begin(), trajectory.end(), [=](const StampedPose& pose) {
+        return std::abs(pose.timestamp_s - timestamp_s) < 1e-6;
+      });
+    };
+    const double withdrawn = summary.frames[85].timestamp_s, confirmed = summary.frames[91].timestamp_s;
+    EXPECT_FALSE(has_pose_at(run.system->FrameTrajectory(), withdrawn));
+    EXPECT_TRUE(has_pose_at(run.system->FrameTrajectory(), confirmed));
+    EXPECT_FALSE(has_pose_at(run.system->KeyframeTrajectory(), withdrawn));
+    EXPECT_FALSE(has_pose_at(run.system->KeyframeTrajectory(), confirmed)) << "it was not then";
+  }
+}
+
 TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
   const Room room = MakeRoom(150), other = MakeRoom(60, 2);
   const WholeRun run =

@@ -96,6 +96,7 @@ class FileBackedVector {
     new (Address(size_)) T(value);
     ++size_;
   }
+  void pop_back() { --size_; }
   void clear() {
     blocks_.Clear();
     size_ = 0;

@@ -65,6 +65,10 @@ TEST(FileBackedVectorTest, HoldsWhatWasPutIn) {
     vector.push_back(Numbered(size));
     ExpectNumbered(vector, size + 1);
     ExpectNumbered(copy, size);
+    vector.pop_back();
+    ExpectNumbered(vector, size);
+    vector.push_back(Numbered(size));
+    ExpectNumbered(vector, size + 1);
     vector.clear();
     EXPECT_TRUE(vector.empty());
     vector.Assign(std::vector<Element>{Numbered(0), Numbered(1)});

@@ -159,6 +159,10 @@ AnchoredPose SlamSystem::TrackedFrame::Pose() const {
 void SlamSystem::Remember(const FrameResult& result) {
   const TrackingResult& tracking = result.tracking;
   const Frame& frame = tracker_.frame();
+  if (tracking.last_was_withdrawn) {
+    tracked_.pop_back();
+    if (backfiller_.has_value()) backfiller_->LastWasWithdrawn();
+  }
   if (tracking.part_was_erased) {
     const auto map = map_.Read();
     const auto is_gone = [&](const TrackedFrame& tracked) {
@@ -181,7 +185,7 @@ void SlamSystem::Remember(const FrameResult& result) {
   }
   if (refiner_.has_value() && !options_.tracker.localise_only) refiner_->Keep(frame, tracking.min_inliers);
   if (!backfiller_.has_value()) return;
-  if (!has_pose || tracking.may_be_erased) {
+  if (!has_pose || tracking.is_provisional) {
     backfiller_->Keep(frame, tracking.min_inliers, has_pose);
   } else {
     backfiller_->ForgetPosed();

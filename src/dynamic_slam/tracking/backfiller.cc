@@ -47,6 +47,12 @@ void Backfiller::PartWasErased() {
   for (KeptFrame& kept : kept_) kept.has_pose = false;
 }
 
+void Backfiller::LastWasWithdrawn() {
+  const auto last =
+      std::find_if(kept_.rbegin(), kept_.rend(), [](const KeptFrame& kept) { return kept.has_pose; });
+  if (last != kept_.rend()) last->has_pose = false;
+}
+
 void Backfiller::Clear() {
   kept_.clear();
   keypoints_ = 0;

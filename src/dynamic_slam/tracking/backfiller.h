@@ -25,14 +25,16 @@ class Backfiller {
  public:
   Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);
 
-  // Keeps what is needed of a frame. has_pose: it has one, but its part of the map may be erased yet. The
+  // Keeps what is needed of a frame. has_pose: it has one, but may lose it yet. The
   // oldest frames are forgotten when all together have more than two million keypoints (130 MB).
   void Keep(const Frame& frame, int min_inliers, bool has_pose);
 
-  // No part of the map will be erased for the frames that have a pose: they are forgotten.
+  // No frame will lose its pose any more: those that have one are forgotten.
   void ForgetPosed();
   // They have none any more.
   void PartWasErased();
+  // The last of them has none any more.
+  void LastWasWithdrawn();
 
   // The poses of frames kept, in the order in which they were found. known: of all frames that have one, in a
   // part of the map that is there. `should_stop` may be empty; when it says so, that is all.

@@ -12,6 +12,7 @@ namespace dynamic_slam {
 namespace {
 
 using testing::IsEmpty;
+using testing::UnorderedElementsAre;
 
 // A camera that moves sideways past a map, 1 unit a second.
 class BackfillerTest : public testing::Test {
@@ -193,6 +194,17 @@ TEST_F(BackfillerTest, FramesOfAnErasedPartAreFoundAndOthersAreNotLookedFor) {
   const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].timestamp_s, 0.4);
+}
+
+TEST_F(BackfillerTest, OnlyTheLastPoseIsWithdrawn) {
+  backfiller_.Keep(FrameAt(0.4), kMinInliers, true);
+  backfiller_.Keep(FrameAt(0.5), kMinInliers, true);
+  backfiller_.Keep(FrameAt(0.6), kMinInliers, false);
+  backfiller_.LastWasWithdrawn();
+  backfiller_.ForgetPosed();
+  std::vector<double> stamps;
+  for (const AnchoredPose& pose : backfiller_.Find(known_, {})) stamps.push_back(pose.timestamp_s);
+  EXPECT_THAT(stamps, UnorderedElementsAre(0.5, 0.6));
 }
 
 TEST_F(BackfillerTest, StopsWhenItIsTold) {

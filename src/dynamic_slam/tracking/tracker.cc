@@ -28,18 +28,6 @@ bool Agree(const Rigid3& a, const Rigid3& b) {
 
 }  // namespace
 
-const char* Name(TrackingState state) {
-  switch (state) {
-    case TrackingState::kInitialising:
-      return "initialising";
-    case TrackingState::kTracking:
-      return "tracking";
-    case TrackingState::kLost:
-      return "lost";
-  }
-  return "";
-}
-
 Tracker::Tracker(const Camera& camera, const OrbOptions& orb, const TrackerOptions& options,
                  const DynamicOptions& dynamic, uint64_t seed, SharedMap* map)
     : camera_(camera),
@@ -131,16 +119,21 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   result.keypoints = static_cast<int>(keypoints);
   if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
   if (!shows_nothing_ && (last_has_pose_ ? TrackFrame() : Relocalise())) {
+    is_unconfirmed_ = !last_has_pose_;
     AcceptPose();
     if (!start_is_certain_) ReviewStart(&result);
-    if (state_ == TrackingState::kTracking && !result.part_was_erased) {
+    if (state_ == TrackingState::kTracking && !result.part_was_erased && !is_unconfirmed_) {
       InsertKeyframeIfDue(keyframes_waiting, &result);
     }
   } else if (state_ == TrackingState::kInitialising) {
     Initialise(&result);
   } else {
     state_ = TrackingState::kLost;
-    if (!shows_nothing_) velocity_.reset();
+    if (!shows_nothing_) {
+      velocity_.reset();
+      result.last_was_withdrawn = std::exchange(is_unconfirmed_, false);
+      if (result.last_was_withdrawn) reason_ += "; the last pose, found by its looks, is withdrawn";
+    }
     ++lost_frames_;
     StartAnewWhenLostForLong(&result);
   }
@@ -151,7 +144,7 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
     start_is_young_ =
         part == start_part_ && (!start_is_certain_ || KeyframesIn(part) <= options_.small_map_keyframes);
   }
-  result.may_be_erased = start_is_young_;
+  result.is_provisional = start_is_young_ || is_unconfirmed_;
   result.min_inliers = Limits().found;
   result.state = state_;
   result.inliers = inliers_;
@@ -171,8 +164,10 @@ void Tracker::AcceptPose() {
     start_is_certain_ = true;
   }
   state_ = TrackingState::kTracking;
-  lost_frames_ = 0;
-  CountVisibility();
+  if (!is_unconfirmed_) {
+    lost_frames_ = 0;
+    CountVisibility();
+  }
   localiser_.Anchor(&frame_);
   velocity_.reset();
   if (last_has_pose_) {
@@ -277,7 +272,7 @@ void Tracker::ForgetPose() {
   visibility_.Clear();
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
-  start_is_young_ = false;
+  start_is_young_ = is_unconfirmed_ = false;
   last_has_pose_ = shows_nothing_ = false;
   velocity_.reset();
   lost_frames_ = 0;

@@ -40,7 +40,8 @@ struct TrackingResult {
   uint32_t map_epoch = 0;                    // of the map that they belong to
   std::vector<AnchoredPose> earlier_frames;  // that have a pose since the map was made
   int min_inliers = 0;                       // that a pose of this image needs
-  bool may_be_erased = false;                // the part of the map in which the pose is: it is young
+  bool is_provisional = false;               // the pose may be withdrawn, or erased with its young part
+  bool last_was_withdrawn = false;           // the last pose: by its looks, and not confirmed by this image
   bool part_was_erased = false;              // of the map, with the poses of the frames in it
 };
 
@@ -140,6 +141,7 @@ class Tracker {
   bool start_is_certain_ = true;
   PartId start_part_;               // of the map, that the last start made
   bool start_is_young_ = false;     // its part is erased when the camera is lost now
+  bool is_unconfirmed_ = false;     // the last pose was found by its looks, and no image tracked from it yet
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
   double velocity_dt_s_ = 0;        // the time between these two
   KeyframeId last_keyframe_;
