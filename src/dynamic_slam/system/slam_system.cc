@@ -262,7 +262,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   if (backfiller_.has_value() && options_.backfill_grows_map && changes_map) {
     Backfill(true, should_stop);
     DrainMapping();
-    if (options_.loop.enabled) JoinParts(should_stop);
+    if (options_.loop.enabled) CloseBorders(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
@@ -289,22 +289,24 @@ void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) 
   tracked_.Assign(all);
 }
 
-void SlamSystem::JoinParts(const std::function<bool()>& should_stop) {
-  if (Parts().size() < 2) return;
+void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   std::vector<AnchoredPose> poses = TrackedPoses();
   const std::vector<AnchoredPose> found = backfiller_->Find(poses, should_stop);
   poses.insert(poses.end(), found.begin(), found.end());
   const KnownPoses known(poses, &map_);
   const uint32_t epoch = map_.Read()->epoch();
-  for (const BridgeFinder::Border& border : BridgeFinder::Borders(known)) {
+  for (const BridgeFinder::Border& border : bridge_finder_.Borders(known)) {
     if (should_stop && should_stop()) return;
-    if (known.AreInOnePart(border.before, border.after)) continue;  // by now
+    if (!bridge_finder_.IsOpen(border)) continue;  // by now
     const auto start = std::chrono::steady_clock::now();
     const Bridge bridge = bridge_finder_.Find(known, border);
-    Loop loop{bridge.keyframe, bridge.neighbour, bridge.keyframe_from_neighbour, {}, {}, true};
+    const bool has_drifted =
+        !known.AreInOnePart(border.before, border.after) || bridge.drift_px >= options_.loop.min_drift_px;
+    Loop loop{bridge.keyframe, bridge.neighbour, bridge.keyframe_from_neighbour, {}, {}, has_drifted};
     for (const auto& [keypoint, landmark] : bridge.links) loop.links.push_back({keypoint, landmark});
     LoopAttempt attempt;
     attempt.matches = bridge.common;
+    attempt.drift_px = bridge.drift_px;
     attempt.reason = bridge.reason;
     FinishLoop(loop_closer_.Join(loop, attempt, epoch, should_stop), start, should_stop);
   }

@@ -158,7 +158,7 @@ class SlamSystem {
   // Looks for poses of frames that have none; grows: and lets the map grow by them.
   void Backfill(bool grows, const std::function<bool()>& should_stop);
   // Makes one of parts of the map where frames of one follow those of another.
-  void JoinParts(const std::function<bool()>& should_stop);
+  void CloseBorders(const std::function<bool()>& should_stop);
   void RefinePoses(const std::function<bool()>& should_stop);
   void SmoothPaths(const std::function<bool()>& should_stop);
   std::vector<AnchoredPose> TrackedPoses() const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -11,6 +12,10 @@
 
 namespace dynamic_slam {
 namespace {
+
+// Keyframes that share most with one, on either side of a border: the map about that one. Across a border
+// no two share more than what is there by chance, as loops have it (LoopOptions::covisible_weight).
+constexpr int kNeighbours = 10, kByChance = 15;
 
 // Keyframes on either side of a border that are looked for from the other.
 constexpr size_t kKeyframes = 4;
@@ -33,6 +38,13 @@ double Spread(std::vector<double>* values) {
   return 0.7413 * (Percentile(0.75, values) - Percentile(0.25, values));
 }
 
+std::vector<KeyframeId> MapAbout(const Map& map, const AnchoredPose& pose) {
+  std::vector<KeyframeId> keyframes{map.ResolveKeyframe(pose.reference).keyframe};
+  for (const CovisibleKeyframe& other : map.keyframes().At(keyframes[0]).BestCovisible(kNeighbours))
+    keyframes.push_back(other.id);
+  return keyframes;
+}
+
 Sim3 ScaleBy(double scale) { return {scale, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()}; }
 
 }  // namespace
@@ -43,16 +55,25 @@ BridgeFinder::BridgeFinder(const Camera& camera, const TrackerOptions& options, 
       map_(map),
       localiser_(camera, options, map->Read()->octave_scales(), map) {}
 
-std::vector<BridgeFinder::Border> BridgeFinder::Borders(const KnownPoses& known) {
+std::vector<BridgeFinder::Border> BridgeFinder::Borders(const KnownPoses& known) const {
   std::vector<Border> borders;
   const KnownPoses::ByStamp& poses = known.by_stamp();
   if (poses.empty()) return borders;
   for (auto pose = poses.begin(); std::next(pose) != poses.end(); ++pose) {
-    const AnchoredPose &before = pose->second, &after = std::next(pose)->second;
-    if (after.timestamp_s - before.timestamp_s <= known.max_gap_s() && !known.AreInOnePart(before, after))
-      borders.push_back({before, after});
+    const Border border{pose->second, std::next(pose)->second};
+    const double gap_s = border.after.timestamp_s - border.before.timestamp_s;
+    if (gap_s <= known.max_gap_s() && IsOpen(border)) borders.push_back(border);
   }
   return borders;
+}
+
+bool BridgeFinder::IsOpen(const Border& border) const {
+  const auto map = map_->Read();
+  const std::vector<KeyframeId> before = MapAbout(*map, border.before), after = MapAbout(*map, border.after);
+  return std::find_first_of(before.begin(), before.end(), after.begin(), after.end(),
+                            [&](KeyframeId a, KeyframeId b) {
+                              return a == b || map->keyframes().At(a).WeightOf(b) > kByChance;
+                            }) == before.end();
 }
 
 Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
@@ -75,12 +96,12 @@ Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
     none.neighbour = map->ResolveKeyframe(border.before.reference).keyframe;
   }
   if (none.common < kMinCommon) {
-    none.reason = fmt::format("{} landmarks are in both parts < {}", none.common, kMinCommon);
+    none.reason = fmt::format("{} landmarks are on both sides < {}", none.common, kMinCommon);
     return none;
   }
   const double scale = Percentile(0.5, &ratios);
   if (const double spread = Spread(&ratios) / scale; spread > kMaxScaleSpread) {
-    none.reason = fmt::format("depths of landmarks in both parts differ by {:.0f}% > {:.0f}% about one scale",
+    none.reason = fmt::format("depths of landmarks on both sides differ by {:.0f}% > {:.0f}% about one scale",
                               100 * spread, 100 * kMaxScaleSpread);
     return none;
   }
@@ -103,7 +124,7 @@ Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
     most_agreeing = agreeing;
   }
   if (most_agreeing < kMinAgreeing) {
-    none.reason = fmt::format("{} of {} keyframes by which the parts fit together agree < {}", most_agreeing,
+    none.reason = fmt::format("{} of {} keyframes by which the sides fit together agree < {}", most_agreeing,
                               sightings.size(), kMinAgreeing);
     return none;
   }
@@ -114,41 +135,33 @@ Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
   const Rigid3 motion =
       best->cam_from_there * map->keyframes().At(bridge.neighbour).cam_from_world().Inverse();
   bridge.keyframe_from_neighbour = ScaleBy(best->is_after ? scale : 1 / scale) * ToSim3(motion);
+  bridge.drift_px = AwayFromLinks_px(*map, bridge, map->keyframes().At(bridge.keyframe).cam_from_world());
   return bridge;
 }
 
 void BridgeFinder::Look(const KnownPoses& known, const AnchoredPose& from, const AnchoredPose& to,
                         std::vector<Sighting>* sightings) {
-  struct Target {
-    KeyframeId id;
-    double away_s = 0;
-  };
-  std::vector<Target> targets;
-  PartId here, there;
+  constexpr double kEver = std::numeric_limits<double>::infinity();
+  const bool is_after = to.timestamp_s > from.timestamp_s;
+  PartId part;
   double unit = 1;  // of `to` in that of `from`, about
   {
     const auto map = map_->Read();
-    here = map->PartOf(from.reference), there = map->PartOf(to.reference);
-    map->keyframes().ForEach([&](const Keyframe& keyframe) {
-      const bool is_of_this_run = keyframe.frame_id().IsValid();  // a map that was loaded has other stamps
-      if (keyframe.part() == there && is_of_this_run)
-        targets.push_back({keyframe.id(), std::abs(keyframe.timestamp_s() - to.timestamp_s)});
-    });
+    part = map->PartOf(from.reference);
     const double depth_here = map->MedianDepth(map->ResolveKeyframe(from.reference).keyframe);
     const double depth_there = map->MedianDepth(map->ResolveKeyframe(to.reference).keyframe);
-    if (depth_here > 0 && depth_there > 0) unit = depth_here / depth_there;
+    if (map->PartOf(to.reference) != part && depth_here > 0 && depth_there > 0)
+      unit = depth_here / depth_there;
   }
-  if (here == there) return;  // they were joined meanwhile
-  std::stable_sort(targets.begin(), targets.end(),
-                   [](const Target& a, const Target& b) { return a.away_s < b.away_s; });
-  targets.resize(std::min(targets.size(), kKeyframes));
-  const std::vector<KnownPoses::Guess> guesses = known.InPart(here).Guesses(to.timestamp_s);
-  for (const Target& target : targets) {
+  const std::vector<KnownPoses::Guess> guesses =
+      known.Within(part, is_after ? -kEver : from.timestamp_s, is_after ? from.timestamp_s : kEver)
+          .Guesses(to.timestamp_s);
+  for (const KeyframeId id : NearestKeyframes(to, is_after)) {
     Frame frame;
     Rigid3 keyframe_from_frame;
     {
       const auto map = map_->Read();
-      const Keyframe& keyframe = map->keyframes().At(target.id);
+      const Keyframe& keyframe = map->keyframes().At(id);
       frame.features = keyframe.features();
       frame.grid = keyframe.grid();
       frame.static_probability = keyframe.static_probability();
@@ -159,8 +172,26 @@ void BridgeFinder::Look(const KnownPoses& known, const AnchoredPose& from, const
     const bool is_found = std::any_of(guesses.begin(), guesses.end(), [&](const KnownPoses::Guess& guess) {
       return Localise({guess.keyframe, keyframe_from_frame * guess.cam_from_world}, &frame);
     });
-    if (is_found) sightings->push_back(SightingOf(target.id, to.timestamp_s > from.timestamp_s, frame));
+    if (!is_found) continue;
+    Sighting sighting = SightingOf(id, is_after, frame);
+    // Where the map about the other side has the keyframe itself, it says nothing new.
+    if (sighting.bridge.neighbour != id) sightings->push_back(std::move(sighting));
   }
+}
+
+std::vector<KeyframeId> BridgeFinder::NearestKeyframes(const AnchoredPose& pose, bool is_after) const {
+  std::vector<std::pair<double, KeyframeId>> by_time;
+  const auto map = map_->Read();
+  map->keyframes().ForEach([&](const Keyframe& keyframe) {
+    const bool is_of_this_run = keyframe.frame_id().IsValid();  // a map that was loaded has other stamps
+    const double away_s = (is_after ? 1 : -1) * (keyframe.timestamp_s() - pose.timestamp_s);
+    if (is_of_this_run && keyframe.part() == map->PartOf(pose.reference) && away_s >= 0)
+      by_time.emplace_back(away_s, keyframe.id());
+  });
+  std::sort(by_time.begin(), by_time.end());
+  std::vector<KeyframeId> nearest;
+  for (size_t i = 0; i < std::min(by_time.size(), kKeyframes); ++i) nearest.push_back(by_time[i].second);
+  return nearest;
 }
 
 bool BridgeFinder::Localise(const KnownPoses::Guess& guess, Frame* frame) {
@@ -188,9 +219,9 @@ BridgeFinder::Sighting BridgeFinder::SightingOf(KeyframeId id, bool is_after, co
   const Keyframe& keyframe = map->keyframes().At(id);
   for (uint32_t keypoint = 0; keypoint < frame.landmarks.size(); ++keypoint) {
     const LandmarkId there = map->Resolve(frame.landmarks[keypoint]);
-    if (!there.IsValid()) continue;
-    sighting.bridge.links.emplace_back(keypoint, there);
     const LandmarkId here = keyframe.landmarks()[keypoint];
+    if (!there.IsValid() || here == there) continue;
+    sighting.bridge.links.emplace_back(keypoint, there);
     if (!here.IsValid()) continue;
     const double depth = (keyframe.cam_from_world() * map->landmarks().At(here).position()).z();
     const double depth_there = (frame.cam_from_world * map->landmarks().At(there).position()).z();
@@ -207,15 +238,21 @@ int BridgeFinder::CountAgreeing(const std::vector<Sighting>& sightings, const Si
     const Sim3 here_from_there = sighting.is_after ? after_from_before : after_from_before.Inverse();
     const Keyframe& keyframe = map->keyframes().At(sighting.bridge.keyframe);
     const Rigid3 by_similarity = ToRigid3(ToSim3(keyframe.cam_from_world()) * here_from_there);
-    std::vector<double> away_px;
-    for (const auto& [keypoint, landmark] : sighting.bridge.links) {
-      const Eigen::Vector3d x = by_similarity * map->landmarks().At(landmark).position();
-      const Keypoint& seen = keyframe.keypoint(keypoint);
-      away_px.push_back(x.z() > 0 ? (camera_.Project(x) - Eigen::Vector2d(seen.x, seen.y)).norm()
-                                  : camera_.width);
-    }
-    return !away_px.empty() && Percentile(0.5, &away_px) <= kAgreement_px;
+    return AwayFromLinks_px(*map, sighting.bridge, by_similarity) <= kAgreement_px;
   }));
+}
+
+double BridgeFinder::AwayFromLinks_px(const Map& map, const Bridge& bridge,
+                                      const Rigid3& cam_from_world) const {
+  const Keyframe& keyframe = map.keyframes().At(bridge.keyframe);
+  std::vector<double> away_px;
+  for (const auto& [keypoint, landmark] : bridge.links) {
+    const Eigen::Vector3d x = cam_from_world * map.landmarks().At(landmark).position();
+    const Keypoint& seen = keyframe.keypoint(keypoint);
+    away_px.push_back(x.z() > 0 ? (camera_.Project(x) - Eigen::Vector2d(seen.x, seen.y)).norm()
+                                : camera_.width);
+  }
+  return away_px.empty() ? camera_.width : Percentile(0.5, &away_px);
 }
 
 }  // namespace dynamic_slam

@@ -13,43 +13,58 @@ namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using testing::SizeIs;
 
 constexpr uint32_t kPoints = 1500;
 
-// A camera that moves sideways, a frame a second. After six it was lost for a moment, and what follows is a
-// part of the map of its own, with a world and a unit of length of its own.
+// A camera that moves sideways, a frame a second. After six it was lost for a moment, and what follows has a
+// world and a unit of length of its own: another part of the map, or the same one that drifted.
 class BridgeFinderTest : public testing::Test {
  protected:
   static constexpr int kKeyframes = 6;  // of either part
 
   // The first points look the same to both parts.
   void MakeParts(size_t same_points = kPoints) {
-    for (int part = 0; part < 2; ++part) {
-      if (part == 1) world_.Repaint(same_points);
-      const PartId id = scene_.map.BeginPart();
-      for (int i = 0; i < kKeyframes; ++i)
-        keyframes_[part].push_back(scene_.Add(SidewaysPose(0.1 * (kKeyframes * part + i)), id));
-      scene_.AddLandmarks(0, kPoints, keyframes_[part]);
-    }
+    MakeSide(0, scene_.map.BeginPart());
+    world_.Repaint(same_points);
+    MakeSide(1, scene_.map.BeginPart());
     scene_.Drift(keyframes_[1], kDrift);
   }
 
-  KnownPoses Known(double gap_s = 0) const {
+  void MakeSide(int side, PartId part, uint32_t points = kPoints) {
+    for (int i = 0; i < kKeyframes; ++i)
+      keyframes_[side].push_back(scene_.Add(SidewaysPose(0.1 * (kKeyframes * side + i)), part));
+    scene_.AddLandmarks(0, points, keyframes_[side]);
+  }
+
+  void LoseFrames(int frames) {
+    for (int i = 0; i < frames; ++i) world_.See(SidewaysPose(0));
+  }
+
+  KnownPoses Known() const {
     std::vector<AnchoredPose> poses;
     scene_.map.keyframes().ForEach([&](const Keyframe& keyframe) {
-      const double later_s = keyframe.part() == scene_.map.PartOf(keyframes_[0][0]) ? 0 : gap_s;
-      poses.push_back({keyframe.timestamp_s() + later_s, keyframe.id(), Rigid3()});
+      poses.push_back({keyframe.timestamp_s(), keyframe.id(), Rigid3()});
     });
     return KnownPoses(poses, &scene_.shared_map);
   }
 
+  std::vector<BridgeFinder::Border> Borders() { return Finder().Borders(Known()); }
+
   Bridge Find() {
     const KnownPoses known = Known();
-    const std::vector<BridgeFinder::Border> borders = BridgeFinder::Borders(known);
+    const std::vector<BridgeFinder::Border> borders = Borders();
     EXPECT_THAT(borders, SizeIs(1));
-    return BridgeFinder(world_.camera(), TrackerOptions(), &scene_.shared_map).Find(known, borders.at(0));
+    return Finder().Find(known, borders.at(0));
+  }
+
+  BridgeFinder Finder() { return {world_.camera(), TrackerOptions(), &scene_.shared_map}; }
+
+  void ExpectKDrift(const Bridge& bridge) {
+    const Sim3 found = SecondFromFirst(bridge);
+    EXPECT_NEAR(found.scale, kDrift.scale, 0.02);
+    EXPECT_LT(found.rotation.angularDistance(kDrift.rotation), 0.005);
+    EXPECT_LT((found.translation - kDrift.translation).norm(), 0.05);
   }
 
   // The second part's world from the first one's.
@@ -58,8 +73,7 @@ class BridgeFinderTest : public testing::Test {
     const Keyframe& neighbour = scene_.map.keyframes().At(bridge.neighbour);
     const Sim3 here_from_there = ToSim3(keyframe.cam_from_world()).Inverse() *
                                  bridge.keyframe_from_neighbour * ToSim3(neighbour.cam_from_world());
-    return keyframe.part() == scene_.map.PartOf(keyframes_[1][0]) ? here_from_there
-                                                                  : here_from_there.Inverse();
+    return keyframe.timestamp_s() > neighbour.timestamp_s() ? here_from_there : here_from_there.Inverse();
   }
 
   SyntheticWorld world_{kPoints};
@@ -76,10 +90,28 @@ TEST_F(BridgeFinderTest, FindsHowThePartsFitTogether) {
   EXPECT_NE(scene_.map.PartOf(bridge.keyframe), scene_.map.PartOf(bridge.neighbour));
   for (const auto& [keypoint, landmark] : bridge.links)
     EXPECT_EQ(scene_.map.PartOf(scene_.map.landmarks().At(landmark)), scene_.map.PartOf(bridge.neighbour));
-  const Sim3 found = SecondFromFirst(bridge);
-  EXPECT_NEAR(found.scale, kDrift.scale, 0.02);
-  EXPECT_LT(found.rotation.angularDistance(kDrift.rotation), 0.005);
-  EXPECT_LT((found.translation - kDrift.translation).norm(), 0.05);
+  ExpectKDrift(bridge);
+}
+
+TEST_F(BridgeFinderTest, FindsHowOnePartDriftedWhereNothingHeldItTogether) {
+  const PartId part = scene_.map.BeginPart();
+  MakeSide(0, part);
+  MakeSide(1, part);
+  EXPECT_LT(Find().drift_px, 1) << "not yet";
+  scene_.Drift(keyframes_[1], kDrift);
+  const Bridge bridge = Find();
+  ASSERT_THAT(bridge.reason, IsEmpty());
+  EXPECT_GT(bridge.drift_px, 20);
+  ExpectKDrift(bridge);
+}
+
+TEST_F(BridgeFinderTest, WhatSharesLandmarksIsNoBorder) {
+  const PartId part = scene_.map.BeginPart();
+  MakeSide(0, part, kPoints / 2);
+  MakeSide(1, part, kPoints / 2);
+  EXPECT_THAT(Borders(), SizeIs(1));
+  scene_.AddLandmarks(kPoints / 2, kPoints, {keyframes_[0][2], keyframes_[1][3]});
+  EXPECT_THAT(Borders(), IsEmpty());
 }
 
 TEST_F(BridgeFinderTest, AFewCommonLandmarksAreEnough) {
@@ -92,7 +124,7 @@ TEST_F(BridgeFinderTest, AFewCommonLandmarksAreEnough) {
 
 TEST_F(BridgeFinderTest, AnotherPlaceIsNoBridge) {
   MakeParts(0);
-  EXPECT_THAT(Find().reason, HasSubstr("0 landmarks are in both parts"));
+  EXPECT_THAT(Find().reason, HasSubstr("0 landmarks are on both sides"));
 }
 
 TEST_F(BridgeFinderTest, PartsOfWhichNobodyKnowsTheScaleAreLeftApart) {
@@ -117,22 +149,16 @@ TEST_F(BridgeFinderTest, OneKeyframeAloneIsNotBelieved) {
   EXPECT_THAT(Find().reason, HasSubstr("agree < 2"));
 }
 
-TEST_F(BridgeFinderTest, PartsThatWereJoinedMeanwhileAreNone) {
-  MakeParts();
-  const KnownPoses known = Known();
-  const std::vector<BridgeFinder::Border> borders = BridgeFinder::Borders(known);
-  scene_.map.MergePart(scene_.map.PartOf(keyframes_[1][0]), scene_.map.PartOf(keyframes_[0][0]),
-                       kDrift.Inverse());
-  BridgeFinder finder(world_.camera(), TrackerOptions(), &scene_.shared_map);
-  EXPECT_THAT(finder.Find(known, borders.at(0)).reason, Not(IsEmpty()));
-  EXPECT_THAT(BridgeFinder::Borders(known), IsEmpty());
-}
-
 TEST_F(BridgeFinderTest, ALongGapIsNoBorder) {
-  MakeParts();
-  EXPECT_THAT(BridgeFinder::Borders(Known(3)), SizeIs(1));
-  EXPECT_THAT(BridgeFinder::Borders(Known(4)), IsEmpty());
-  EXPECT_THAT(BridgeFinder::Borders(KnownPoses(&scene_.shared_map)), IsEmpty());
+  MakeSide(0, scene_.map.BeginPart());
+  LoseFrames(3);
+  MakeSide(1, scene_.map.BeginPart());
+  EXPECT_THAT(Borders(), SizeIs(1));
+  LoseFrames(4);
+  keyframes_[1].clear();
+  MakeSide(1, scene_.map.BeginPart());
+  EXPECT_THAT(Borders(), SizeIs(1)) << "no other";
+  EXPECT_THAT(Finder().Borders(KnownPoses(&scene_.shared_map)), IsEmpty());
 }
 
 }  // namespace

@@ -32,11 +32,12 @@ KnownPoses::KnownPoses(std::span<const AnchoredPose> poses, const SharedMap* map
   LearnMotion();
 }
 
-KnownPoses KnownPoses::InPart(PartId part) const {
+KnownPoses KnownPoses::Within(PartId part, double first_s, double last_s) const {
   KnownPoses those = *this;
   const auto map = map_->Read();
-  std::erase_if(those.by_stamp_,
-                [&](const auto& pose) { return map->PartOf(pose.second.reference) != part; });
+  std::erase_if(those.by_stamp_, [&](const auto& pose) {
+    return pose.first < first_s || pose.first > last_s || map->PartOf(pose.second.reference) != part;
+  });
   return those;
 }
 

@@ -35,8 +35,8 @@ class KnownPoses {
   void Add(const AnchoredPose& pose) { by_stamp_.emplace(pose.timestamp_s, pose); }
   // What was learnt from it stays.
   void Forget(double timestamp_s) { by_stamp_.erase(timestamp_s); }
-  // Those in one part of the map, and what was learnt from all.
-  KnownPoses InPart(PartId part) const;
+  // Those in one part of the map that are not outside these stamps, and what was learnt from all.
+  KnownPoses Within(PartId part, double first_s, double last_s) const;
 
   // Median time from pose to pose; 0: nobody knows which frames are in a row.
   double interval_s() const { return interval_s_; }

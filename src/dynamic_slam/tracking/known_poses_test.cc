@@ -65,7 +65,7 @@ TEST_F(KnownPosesTest, NobodyIsMuchFasterThanTheCameraNearlyAlwaysWas) {
 TEST_F(KnownPosesTest, OfOnePartItStillKnowsHowOftenThereAreFrames) {
   poses_.push_back({1.5, other_, Rigid3()});
   const KnownPoses known = Known();
-  const KnownPoses those = known.InPart(scene_.map.PartOf(other_));
+  const KnownPoses those = known.Within(scene_.map.PartOf(other_), 1, 2);
   EXPECT_EQ(those.by_stamp().size(), 1u);
   EXPECT_EQ(those.max_gap_s(), known.max_gap_s());
   EXPECT_EQ(those.Guesses(1.55).size(), 1u);
