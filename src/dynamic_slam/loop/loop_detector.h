@@ -19,7 +19,7 @@ struct LoopAttempt {
   double timestamp_s = 0;  // of the keyframe
   double candidate_timestamp_s = 0;
   double score = 0;      // of PlaceIndex
-  int matches = 0;       // of landmarks, by their descriptors; at the border of two parts, landmarks in both
+  int matches = 0;       // of landmarks, by their descriptors; at a border, landmarks on both sides
   int sim3_inliers = 0;  // of these
   int visible = 0;       // landmarks of the old place that the keyframe should see
   int inliers = 0;       // of these: show where the similarity puts them

@@ -157,7 +157,8 @@ class SlamSystem {
   void Remember(const FrameResult& result);
   // Looks for poses of frames that have none; grows: and lets the map grow by them.
   void Backfill(bool grows, const std::function<bool()>& should_stop);
-  // Makes one of parts of the map where frames of one follow those of another.
+  // Makes one of parts of the map where frames of one follow those of another, and mends a part that has such
+  // a border in itself.
   void CloseBorders(const std::function<bool()>& should_stop);
   void RefinePoses(const std::function<bool()>& should_stop);
   void SmoothPaths(const std::function<bool()>& should_stop);
