@@ -57,6 +57,7 @@ LoopResult LoopCloser::Join(Loop loop, LoopAttempt attempt, uint32_t epoch,
     attempt.inliers = static_cast<int>(loop.links.size());
     attempt.scale = loop.keyframe_from_candidate.scale;
     loop.landmarks = LandmarksOfPlace(*map, *candidate);
+    loop.has_drifted = HasDrifted(*keyframe, *candidate, attempt.drift_px, options_);
   }
   result.attempts.push_back(attempt);
   if (attempt.reason.empty()) Close(loop, should_stop, &result);

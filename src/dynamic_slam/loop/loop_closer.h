@@ -32,8 +32,9 @@ class LoopCloser {
   // corrected.
   LoopResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
 
-  // Joins two parts by a similarity of which another is sure. The attempt says how it was found; where it has
-  // a reason, it is no loop, and nothing happens.
+  // Closes a loop of whose similarity another is sure; of it, the landmarks of the place and whether it has
+  // drifted are found here. The attempt says how it was found; where it has a reason, it is no loop, and
+  // nothing happens.
   LoopResult Join(Loop loop, LoopAttempt attempt, uint32_t epoch,
                   const std::function<bool()>& should_stop = {});
 

@@ -81,6 +81,11 @@ Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe) {
   return ToSim3(other.cam_from_world() * keyframe.cam_from_world().Inverse());
 }
 
+bool HasDrifted(const Keyframe& keyframe, const Keyframe& candidate, double drift_px,
+                const LoopOptions& options) {
+  return keyframe.part() != candidate.part() || drift_px >= options.min_drift_px;
+}
+
 std::vector<LandmarkId> LandmarksOfPlace(const Map& map, const Keyframe& keyframe) {
   return LandmarksAbout(map, keyframe, kPlaceKeyframes);
 }
@@ -250,7 +255,7 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
   attempt->inliers = static_cast<int>(loop.links.size());
   attempt->scale = loop.keyframe_from_candidate.scale;
   attempt->drift_px = Median(drifts_px);
-  loop.has_drifted = keyframe.part() != candidate.part() || attempt->drift_px >= options_.min_drift_px;
+  loop.has_drifted = HasDrifted(keyframe, candidate, attempt->drift_px, options_);
   if (attempt->inliers < options_.min_inliers) {
     attempt->reason = fmt::format("{} landmarks found < {}", attempt->inliers, options_.min_inliers);
     return loop;

@@ -46,6 +46,10 @@ struct Loop {
 // Cameras, in the map's units about them, which are one within a part.
 Sim3 FromKeyframe(const Keyframe& other, const Keyframe& keyframe);
 
+// Whether the map is to be moved; parts always are.
+bool HasDrifted(const Keyframe& keyframe, const Keyframe& candidate, double drift_px,
+                const LoopOptions& options);
+
 // The landmarks about a keyframe that make a place.
 std::vector<LandmarkId> LandmarksOfPlace(const Map& map, const Keyframe& keyframe);
 

@@ -300,9 +300,7 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
     if (!bridge_finder_.IsOpen(border)) continue;  // by now
     const auto start = std::chrono::steady_clock::now();
     const Bridge bridge = bridge_finder_.Find(known, border);
-    const bool has_drifted =
-        !known.AreInOnePart(border.before, border.after) || bridge.drift_px >= options_.loop.min_drift_px;
-    Loop loop{bridge.keyframe, bridge.neighbour, bridge.keyframe_from_neighbour, {}, {}, has_drifted};
+    Loop loop{bridge.keyframe, bridge.neighbour, bridge.keyframe_from_neighbour, {}, {}};
     for (const auto& [keypoint, landmark] : bridge.links) loop.links.push_back({keypoint, landmark});
     LoopAttempt attempt;
     attempt.matches = bridge.common;

@@ -121,7 +121,7 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   if (!shows_nothing_ && (last_has_pose_ ? TrackFrame() : Relocalise())) {
     is_unconfirmed_ = !last_has_pose_;
     AcceptPose();
-    if (!start_is_certain_) ReviewStart(&result);
+    if (!start_is_certain_ && !is_unconfirmed_) ReviewStart(&result);
     if (state_ == TrackingState::kTracking && !result.part_was_erased && !is_unconfirmed_) {
       InsertKeyframeIfDue(keyframes_waiting, &result);
     }
