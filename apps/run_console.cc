@@ -99,6 +99,19 @@ void PrintSummary(const RunSummary& summary) {
   } else {
     fmt::print("no map was made: {}\n", summary.last_reason);
   }
+  if (summary.pieces_cut > 0) {
+    fmt::print(
+        "{} of the path {} cut off, to {} (trajectory_2.txt, ...): the camera cannot have come from there\n",
+        summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
+        summary.pieces_cut == 1 ? "is" : "are",
+        summary.pieces_cut == 1 ? "a map of its own" : "maps of their own");
+  }
+  for (const RunSummary::Leap& leap : summary.leaps) {
+    fmt::print(
+        "the path leaps {:.2f} s after its begin, {:.1f} times faster than can be: one side of it stands "
+        "wrong\n",
+        leap.from_s - summary.frames[0].timestamp_s, leap.times_too_fast);
+  }
   for (const SourceProblem& problem : summary.skipped)
     fmt::print("skipped {}: {}\n", problem.name, problem.reason);
   fmt::print("tracking {:.1f} ms a frame (median), mapping {:.1f} ms a keyframe, {:.1f} s in all\n",

@@ -15,7 +15,7 @@ FRAMES = 100
 RESULTS = ["config.yaml", "frames.csv", "keyframes.txt", "loops.csv", "map.ply", "report.html", "summary.json",
            "trajectory.png", "trajectory.txt"]
 SUMMARY_KEYS = ["frames_total", "frames_tracked", "frames_backfilled", "coverage", "keyframes", "landmarks",
-                "initialised_at", "lost_count", "tracking_ms", "startup_s", "wall_s", "peak_rss_mb", "mode", "seed",
+                "initialised_at", "lost_count", "pieces_cut", "leaps", "tracking_ms", "startup_s", "wall_s", "peak_rss_mb", "mode", "seed",
                 "version"]
 CAMERA = "model: pinhole\nwidth: 640\nheight: 480\nfps: 30\nfx: 535.4\nfy: 539.2\ncx: 320.1\ncy: 247.6\n"
 
@@ -199,6 +199,7 @@ class CliRunTest(unittest.TestCase):
             self.assertIn(reason, reasons.get(name, "not skipped"), name)
         self.assertEqual(len(read(out, "frames.csv").splitlines()), 1 + FRAMES + 1 - 8)
         self.assertEqual(summary["lost_count"], 0)
+        self.assertEqual(summary["leaps"], [])
         self.assertGreater(summary["frames_tracked"], 80)
 
     def interrupt(self, signal_number, source, *arguments):

@@ -147,6 +147,43 @@ void Map::MergePart(PartId from, PartId into, const Sim3& into_from_from) {
   origins_[from.value()] = KeyframeId();
 }
 
+PartId Map::SplitPart(const std::vector<KeyframeId>& keyframes) {
+  DS_CHECK(!keyframes.empty(), "keyframes={}", keyframes.size());
+  BeginRevision();
+  const PartId from = keyframes_.At(keyframes.front()).part();
+  const PartId part = BeginPart();
+  for (const KeyframeId id : keyframes) keyframes_.At(id).part_ = part;
+  for (const KeyframeId id : keyframes) {
+    const std::vector<LandmarkId> landmarks = keyframes_.At(id).landmarks_;
+    for (const LandmarkId landmark : landmarks) {
+      if (!landmarks_.Contains(landmark)) continue;
+      const std::vector<Observation> observations = landmarks_.At(landmark).observations();
+      const auto is_here = [&](const Observation& seen) {
+        return keyframes_.At(seen.keyframe).part() == part;
+      };
+      const auto here = std::count_if(observations.begin(), observations.end(), is_here);
+      const auto there = static_cast<std::ptrdiff_t>(observations.size()) - here;
+      if (there == 0) continue;
+      for (const Observation& seen : observations) {
+        // It may fall with an earlier one.
+        if (is_here(seen) != (here > there) && landmarks_.Contains(landmark))
+          Unlink(seen.keyframe, seen.keypoint);
+      }
+    }
+  }
+  origins_[from.value()] = OldestOf(from);
+  origins_[part.value()] = OldestOf(part);
+  return part;
+}
+
+KeyframeId Map::OldestOf(PartId part) const {
+  KeyframeId oldest;
+  keyframes_.ForEach([&](const Keyframe& keyframe) {
+    if (keyframe.part() == part && !oldest.IsValid()) oldest = keyframe.id();
+  });
+  return oldest;
+}
+
 void Map::Link(KeyframeId keyframe_id, uint32_t keypoint, LandmarkId landmark_id) {
   Keyframe& keyframe = keyframes_.At(keyframe_id);
   Landmark& landmark = landmarks_.At(landmark_id);
@@ -230,11 +267,7 @@ void Map::EraseKeyframe(KeyframeId id, KeyframeId heir) {
   const bool is_origin = IsOrigin(id);
   keyframes_.Erase(id);
   places_.Erase(id);
-  if (!is_origin) return;
-  KeyframeId& origin = origins_[part.value()] = KeyframeId();
-  keyframes_.ForEach([&](const Keyframe& keyframe) {
-    if (keyframe.part() == part && !origin.IsValid()) origin = keyframe.id();
-  });
+  if (is_origin) origins_[part.value()] = OldestOf(part);
 }
 
 void Map::MergeLandmarks(LandmarkId from, LandmarkId into) {

@@ -57,6 +57,10 @@ class Map {
   // The part `from` becomes a piece of `into`, moved and scaled.
   void MergePart(PartId from, PartId into, const Sim3& into_from_from);
 
+  // Keyframes of one part, not all of them, become a part of their own. Landmarks that both see stay with
+  // those of whom more see them.
+  PartId SplitPart(const std::vector<KeyframeId>& keyframes);
+
   Landmark& AddLandmark(const Eigen::Vector3d& position, KeyframeId created_by) {
     return landmarks_.Emplace(position, created_by);
   }
@@ -128,6 +132,8 @@ class Map {
   std::vector<std::string> Validate() const;
 
  private:
+  KeyframeId OldestOf(PartId part) const;
+
   std::vector<float> octave_scales_;
   uint32_t epoch_ = 0, revision_ = 0;
   IdTable<KeyframeId, Keyframe> keyframes_;

@@ -385,6 +385,34 @@ TEST(MapTest, PartsHaveAnOriginEachAndCanBeErased) {
   EXPECT_EQ(map.BeginPart(), PartId(2)) << "ids are never reused";
 }
 
+TEST(MapTest, APartIsSplitBetweenItsKeyframes) {
+  Map map = MakeMap();
+  std::vector<KeyframeId> keyframes;
+  for (int i = 0; i < 5; ++i) keyframes.push_back(AddKeyframe(&map, 10));
+  const auto link = [&](uint32_t keypoint, const std::vector<size_t>& who) {
+    const LandmarkId id = map.AddLandmark({0, 0, 1}, keyframes[who[0]]).id();
+    for (const size_t i : who) map.Link(keyframes[i], keypoint, id);
+    return id;
+  };
+  const LandmarkId of_first = link(0, {0, 1}), of_second = link(1, {2, 3, 4}),
+                   mostly_first = link(2, {0, 1, 2}), mostly_second = link(3, {1, 2, 3, 4}),
+                   of_neither = link(4, {1, 2});
+  const PartId part = map.SplitPart({keyframes[0], keyframes[1]});
+  EXPECT_EQ(map.Parts(), (std::vector{PartId(0), part}));
+  EXPECT_TRUE(map.IsOrigin(keyframes[0]) && map.IsOrigin(keyframes[2]));
+  EXPECT_EQ(map.PartOf(keyframes[1]), part);
+  EXPECT_EQ(map.PartOf(keyframes[4]), PartId(0));
+  EXPECT_EQ(map.landmarks().At(of_first).observations().size(), 2u);
+  EXPECT_EQ(map.landmarks().At(of_second).observations().size(), 3u);
+  EXPECT_EQ(map.PartOf(map.landmarks().At(mostly_first)), part);
+  EXPECT_EQ(map.landmarks().At(mostly_first).observations().size(), 2u);
+  EXPECT_EQ(map.PartOf(map.landmarks().At(mostly_second)), PartId(0));
+  EXPECT_EQ(map.landmarks().At(mostly_second).observations().size(), 3u);
+  EXPECT_FALSE(map.landmarks().Contains(of_neither)) << "one view is none";
+  EXPECT_EQ(map.keyframes().At(keyframes[1]).WeightOf(keyframes[2]), 0);
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
 TEST(IdTable, WhatIsGoneStaysGoneAndTheOthersStay) {
   struct Value {
     explicit Value(LandmarkId id_in) : id(id_in) {}

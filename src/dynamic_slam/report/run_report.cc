@@ -97,6 +97,16 @@ Json TilesSection(const Run& run) {
     tiles.push_back(Tile("keypoints in dynamic boxes", fmt::format("{:.1f}%", 100 * s.mean_dynamic_ratio),
                          fmt::format("mean; detector {}", s.detector)));
   }
+  if (!s.leaps.empty()) {
+    tiles.push_back(Tile("leaps of the path", fmt::format("{}", s.leaps.size()),
+                         fmt::format("the first at {:.2f} s: what is on one side of it stands wrong",
+                                     run.Since(s.leaps[0].from_s)),
+                         "bad"));
+  }
+  if (s.pieces_cut > 0) {
+    tiles.push_back(Tile("pieces cut off", fmt::format("{}", s.pieces_cut),
+                         "the camera cannot have come from there", "wait"));
+  }
   if (s.loops.corrected + s.loops.linked > 0) {
     tiles.push_back(Tile("loops closed", fmt::format("{}", s.loops.corrected + s.loops.linked),
                          fmt::format("{} moved the map", s.loops.corrected)));

@@ -80,6 +80,12 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                           {"iterations", summary.final_bundle.iterations},
                           {"initial_cost", summary.final_bundle.initial_cost},
                           {"final_cost", summary.final_bundle.final_cost}};
+  json["pieces_cut"] = summary.pieces_cut;
+  json["leaps"] = nlohmann::ordered_json::array();
+  for (const RunSummary::Leap& leap : summary.leaps) {
+    json["leaps"].push_back(
+        {{"from", leap.from_s}, {"to", leap.to_s}, {"times_too_fast", leap.times_too_fast}});
+  }
   if (summary.scale.has_value()) {
     json["scale"] = {{"metres_per_unit", summary.scale->metres_per_unit},
                      {"relative_error", summary.scale->relative_error},

@@ -50,6 +50,13 @@ struct RunSummary {
   double startup_s = 0;  // from the start of the process to the first frame
   double wall_s = 0;     // from the first frame to the final map
   double peak_rss_mb = 0;
+  int pieces_cut = 0;  // of the path, that became maps of their own (SlamSystem::PiecesCut)
+  // Where the path of the main map leaps all the same: what is on one side stands wrong.
+  struct Leap {
+    double from_s = 0, to_s = 0;  // stamps
+    double times_too_fast = 1;    // PathLeap
+  };
+  std::vector<Leap> leaps;
   std::optional<MetricScale> scale;  // of the main part of the map, if anything says how long its unit is
   bool interrupted = false;
   std::exception_ptr failure;          // what ended the run early, if anything was thrown

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/geometry/path_leaps.h"
 #include "dynamic_slam/system/frame_feed.h"
 
 namespace dynamic_slam {
@@ -152,7 +153,12 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
   const bool is_whole = !summary.interrupted && summary.failure == nullptr;
   summary.frames_total = is_whole ? std::max(announced, seen) : seen;
   summary.frames_tracked = system.LiveFrameCount();
-  summary.frames_backfilled = system.FrameTrajectory().size() - summary.frames_tracked;
+  const Trajectory path = system.FrameTrajectory();
+  summary.frames_backfilled = path.size() - summary.frames_tracked;
+  summary.pieces_cut = system.PiecesCut();
+  for (const PathLeap& leap : FindLeaps(path)) {
+    summary.leaps.push_back({path[leap.first].timestamp_s, path[leap.last].timestamp_s, leap.times_too_fast});
+  }
   {
     const auto map = system.map().Read();
     summary.keyframes = map->keyframes().size();

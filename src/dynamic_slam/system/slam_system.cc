@@ -5,6 +5,7 @@
 #include <cmath>
 #include <exception>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -15,7 +16,6 @@
 #include "dynamic_slam/base/thread_priority.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/map_bundle.h"
-#include "dynamic_slam/optimize/path_smoother.h"
 
 namespace dynamic_slam {
 namespace {
@@ -76,6 +76,7 @@ SlamSystem::SlamSystem(const Camera& raw_camera, const SystemOptions& options, R
                &map_),
       mapper_(camera(), options.mapper, &map_),
       loop_closer_(camera(), options.loop, options.seed, &map_),
+      tracked_(&map_),
       bridge_finder_(camera(), options.tracker, &map_),
       executor_(std::move(executor)) {
   if (mode_ == RunMode::kRealtime) StartImageThreads();
@@ -144,44 +145,23 @@ void SlamSystem::ThrowIfFailed() const {
   executor_->ThrowIfFailed();
 }
 
-SlamSystem::TrackedFrame::TrackedFrame(const AnchoredPose& pose, bool is_live_in)
-    : timestamp_s(pose.timestamp_s), reference(pose.reference), is_live(is_live_in) {
-  Eigen::Map<Eigen::Vector4f>(rotation_xyzw.data()) = pose.cam_from_reference.rotation.coeffs().cast<float>();
-  Eigen::Map<Eigen::Vector3f>(translation.data()) = pose.cam_from_reference.translation.cast<float>();
-}
-
-AnchoredPose SlamSystem::TrackedFrame::Pose() const {
-  const Eigen::Map<const Eigen::Quaternionf> rotation(rotation_xyzw.data());
-  const Eigen::Map<const Eigen::Vector3f> cam_from_reference(translation.data());
-  return {timestamp_s, reference, Rigid3(rotation.cast<double>(), cam_from_reference.cast<double>())};
-}
-
 void SlamSystem::Remember(const FrameResult& result) {
   const TrackingResult& tracking = result.tracking;
   const Frame& frame = tracker_.frame();
   if (tracking.last_was_withdrawn) {
-    tracked_.pop_back();
+    tracked_.RemoveLast();
     if (backfiller_.has_value()) backfiller_->LastWasWithdrawn();
   }
   if (tracking.part_was_erased) {
-    const auto map = map_.Read();
-    const auto is_gone = [&](const TrackedFrame& tracked) {
-      return !map->PartOf(tracked.reference).IsValid();
-    };
-    std::vector<TrackedFrame> left(tracked_.begin(), tracked_.end());
-    std::erase_if(left, is_gone);
-    tracked_.Assign(left);
+    tracked_.RemoveThoseOfErasedParts();
     if (backfiller_.has_value()) backfiller_->PartWasErased();
   }
   const bool has_pose = tracking.state == TrackingState::kTracking;
   if (has_pose) {
     if (options_.backfill) {
-      for (const AnchoredPose& earlier : tracking.earlier_frames) {
-        tracked_.push_back(TrackedFrame(earlier, false));
-      }
+      for (const AnchoredPose& earlier : tracking.earlier_frames) tracked_.Add(earlier, false);
     }
-    const AnchoredPose pose{frame.timestamp_s, frame.reference, frame.cam_from_reference};
-    tracked_.push_back(TrackedFrame(pose, true));
+    tracked_.Add({frame.timestamp_s, frame.reference, frame.cam_from_reference}, true);
   }
   if (refiner_.has_value() && !options_.tracker.localise_only) refiner_->Keep(frame, tracking.min_inliers);
   if (!backfiller_.has_value()) return;
@@ -267,14 +247,14 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) Backfill(false, should_stop);
-  if (refiner_.has_value() && changes_map) RefinePoses(should_stop);
-  if (mode_ == RunMode::kOffline && options_.smooth_path) SmoothPaths(should_stop);
+  if (refiner_.has_value() && changes_map) tracked_.Refine(refiner_->Refine(tracked_.Poses(), should_stop));
+  if (changes_map && refiner_.has_value() && backfiller_.has_value()) CutAtLeaps(should_stop);
+  if (mode_ == RunMode::kOffline && options_.smooth_path) tracked_.Smooth(should_stop);
   return bundle;
 }
 
 void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) {
-  std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
-  const std::vector<AnchoredPose> known = TrackedPoses();
+  const std::vector<AnchoredPose> known = tracked_.Poses();
   const uint32_t epoch = map_.Read()->epoch();
   const auto map_keyframe = [this, epoch](KeyframeId keyframe) {
     PostMapping(keyframe, epoch);
@@ -282,15 +262,11 @@ void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) 
   };
   const std::vector<AnchoredPose> found =
       grows ? backfiller_->Grow(known, map_keyframe, should_stop) : backfiller_->Find(known, should_stop);
-  for (const AnchoredPose& pose : found) all.emplace_back(pose, false);
-  std::stable_sort(all.begin(), all.end(), [](const TrackedFrame& a, const TrackedFrame& b) {
-    return a.timestamp_s < b.timestamp_s;
-  });
-  tracked_.Assign(all);
+  tracked_.AddFound(found);
 }
 
 void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
-  std::vector<AnchoredPose> poses = TrackedPoses();
+  std::vector<AnchoredPose> poses = tracked_.Poses();
   const std::vector<AnchoredPose> found = backfiller_->Find(poses, should_stop);
   poses.insert(poses.end(), found.begin(), found.end());
   const KnownPoses known(poses, &map_);
@@ -310,53 +286,40 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   }
 }
 
-void SlamSystem::RefinePoses(const std::function<bool()>& should_stop) {
-  std::map<double, AnchoredPose> refined;
-  for (const AnchoredPose& pose : refiner_->Refine(TrackedPoses(), should_stop))
-    refined.emplace(pose.timestamp_s, pose);
-  std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
-  for (TrackedFrame& frame : all) {
-    const auto found = refined.find(frame.timestamp_s);
-    if (found != refined.end()) frame = TrackedFrame(found->second, frame.is_live);
-  }
-  tracked_.Assign(all);
-}
-
-void SlamSystem::SmoothPaths(const std::function<bool()>& should_stop) {
-  std::vector<TrackedFrame> all(tracked_.begin(), tracked_.end());
-  std::map<PartId, std::vector<size_t>> frames;
-  std::vector<StampedPose> poses;
-  {
-    const auto map = map_.Read();
-    for (size_t i = 0; i < all.size(); ++i) {
-      const AnchoredPose pose = all[i].Pose();
-      poses.push_back(
-          {pose.timestamp_s, map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse()});
-      frames[map->PartOf(pose.reference)].push_back(i);
+void SlamSystem::CutAtLeaps(const std::function<bool()>& should_stop) {
+  const std::vector<TrackedFrames::CutPiece> pieces = tracked_.CutAtLeaps();
+  if (pieces.empty()) return;
+  std::map<double, PartId> cut;  // by stamp
+  std::set<double> stamps;
+  for (const TrackedFrames::CutPiece& piece : pieces) {
+    for (const StampedPose& pose : tracked_.PathOf(piece.part)) {
+      cut[pose.timestamp_s] = piece.part;
+      stamps.insert(pose.timestamp_s);
     }
   }
-  for (const auto& [part, those] : frames) {
-    if (should_stop && should_stop()) return;
-    std::vector<StampedPose> path;
-    for (const size_t i : those) path.push_back(poses[i]);
-    const std::vector<Rigid3> smooth = SmoothPath(path);
-    for (size_t k = 0; k < those.size(); ++k) poses[those[k]].world_from_cam = smooth[k];
-  }
-  {
-    const auto map = map_.Read();
-    for (size_t i = 0; i < all.size(); ++i) {
-      AnchoredPose pose = all[i].Pose();
-      pose.cam_from_reference = map->CamFromReference(pose.reference, poses[i].world_from_cam.Inverse());
-      all[i] = TrackedFrame(pose, all[i].is_live);
+  refiner_->ForEachOf(
+      stamps, [this](const Frame& frame, int min_inliers) { backfiller_->Keep(frame, min_inliers, false); });
+  std::vector<AnchoredPose> known = tracked_.Poses();
+  std::erase_if(known, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
+  std::vector<AnchoredPose> found = backfiller_->Find(known, should_stop);
+  for (const TrackedFrames::CutPiece& piece : pieces) {
+    if (tracked_.IsWrong(piece, found)) {
+      ++pieces_cut_;
+      continue;
     }
+    map_.Write()->MergePart(piece.part, piece.cut_from, Sim3());
+    std::erase_if(found, [&](const AnchoredPose& pose) {
+      const auto of_piece = cut.find(pose.timestamp_s);
+      return of_piece != cut.end() && of_piece->second == piece.part;
+    });
   }
-  tracked_.Assign(all);
-}
-
-std::vector<AnchoredPose> SlamSystem::TrackedPoses() const {
-  std::vector<AnchoredPose> poses;
-  for (const TrackedFrame& frame : tracked_) poses.push_back(frame.Pose());
-  return poses;
+  if (pieces_cut_ == 0) return;
+  tracked_.AddFound(found);
+  const std::vector<PartId> with_frames = tracked_.Parts();
+  for (const TrackedFrames::CutPiece& piece : pieces) {
+    const bool is_left = std::find(with_frames.begin(), with_frames.end(), piece.part) != with_frames.end();
+    if (!is_left) map_.Write()->ErasePart(piece.part);  // if it is not joined again
+  }
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
@@ -412,7 +375,8 @@ void SlamSystem::Reset() {
   tracker_.Reset();
   if (detection_.has_value()) detection_->Reset();
   colour_.release();  // a detector that hangs may still read it
-  tracked_.clear();
+  tracked_.Clear();
+  pieces_cut_ = 0;
   if (backfiller_.has_value()) backfiller_->Clear();
   if (refiner_.has_value()) refiner_->Clear();
   *mapping_report_.Write() = MappingReport();
@@ -423,43 +387,13 @@ void SlamSystem::Reset() {
   is_stopped_ = false;
 }
 
-std::vector<PartId> SlamSystem::Parts() const {
-  const auto map = map_.Read();
-  std::vector<PartId> parts = map->Parts();
-  std::map<PartId, size_t> frames;
-  for (const TrackedFrame& frame : tracked_) ++frames[map->PartOf(frame.reference)];
-  std::erase_if(parts, [&](PartId part) { return frames[part] == 0; });
-  std::stable_sort(parts.begin(), parts.end(), [&](PartId a, PartId b) { return frames[a] > frames[b]; });
-  return parts;
-}
-
 PartId SlamSystem::OrMain(PartId part) const {
   if (part.IsValid()) return part;
   const std::vector<PartId> parts = Parts();
   return parts.empty() ? PartId() : parts.front();
 }
 
-Trajectory SlamSystem::FrameTrajectory(PartId part) const {
-  part = OrMain(part);
-  Trajectory trajectory;
-  trajectory.reserve(tracked_.size());
-  const auto map = map_.Read();
-  for (const TrackedFrame& frame : tracked_) {
-    if (map->PartOf(frame.reference) != part) continue;
-    const AnchoredPose pose = frame.Pose();
-    trajectory.push_back(
-        {pose.timestamp_s, map->PoseFromReference(pose.reference, pose.cam_from_reference).Inverse()});
-  }
-  return trajectory;
-}
-
-size_t SlamSystem::LiveFrameCount() const {
-  const PartId part = OrMain({});
-  const auto map = map_.Read();
-  return static_cast<size_t>(std::count_if(tracked_.begin(), tracked_.end(), [&](const TrackedFrame& frame) {
-    return frame.is_live && map->PartOf(frame.reference) == part;
-  }));
-}
+Trajectory SlamSystem::FrameTrajectory(PartId part) const { return tracked_.PathOf(OrMain(part)); }
 
 Trajectory SlamSystem::KeyframeTrajectory(PartId part) const {
   part = OrMain(part);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -11,7 +10,6 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "dynamic_slam/base/file_backed_vector.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
@@ -23,6 +21,7 @@
 #include "dynamic_slam/system/executor.h"
 #include "dynamic_slam/system/run_mode.h"
 #include "dynamic_slam/system/system_options.h"
+#include "dynamic_slam/system/tracked_frames.h"
 #include "dynamic_slam/tracking/backfiller.h"
 #include "dynamic_slam/tracking/bridge_finder.h"
 #include "dynamic_slam/tracking/pose_refiner.h"
@@ -109,14 +108,17 @@ class SlamSystem {
   // Parts of the map with frames, each with a world and a unit of length of its own: the one with the most
   // frames first. More than one where tracking was lost, started anew, and saw nothing since that it knew
   // before.
-  std::vector<PartId> Parts() const;
+  std::vector<PartId> Parts() const { return tracked_.Parts(); }
 
   // The frames that have a pose in the part, the main one unless it is said, at where the map puts them now.
   Trajectory FrameTrajectory(PartId part = {}) const;
   Trajectory KeyframeTrajectory(PartId part = {}) const;  // without those of a map that was loaded
 
   // Frames of FrameTrajectory that had their pose when their turn came.
-  size_t LiveFrameCount() const;
+  size_t LiveFrameCount() const { return tracked_.LiveCountOf(OrMain({})); }
+
+  // Pieces of the path that Finish() made parts of their own, as they stood wrong in the map.
+  int PiecesCut() const { return pieces_cut_; }
 
   // None without a detector.
   std::optional<DetectionReport> detection_report() const {
@@ -133,18 +135,6 @@ class SlamSystem {
   const SystemOptions& options() const { return options_; }
 
  private:
-  // An AnchoredPose in half the room, since there is one for each frame: float has it to 1e-7 of its length.
-  struct TrackedFrame {
-    double timestamp_s = 0;
-    KeyframeId reference;
-    bool is_live = false;  // not given its pose by a later frame
-    std::array<float, 4> rotation_xyzw{};
-    std::array<float, 3> translation{};
-
-    TrackedFrame(const AnchoredPose& pose, bool is_live_in);
-    AnchoredPose Pose() const;
-  };
-
   struct MappedKeyframe {
     KeyframeId id;
     uint32_t epoch;  // of the map
@@ -160,9 +150,9 @@ class SlamSystem {
   // Makes one of parts of the map where frames of one follow those of another, and mends a part that has such
   // a border in itself.
   void CloseBorders(const std::function<bool()>& should_stop);
-  void RefinePoses(const std::function<bool()>& should_stop);
-  void SmoothPaths(const std::function<bool()>& should_stop);
-  std::vector<AnchoredPose> TrackedPoses() const;
+  // Pieces of the path from which the camera cannot have come, and whose frames the rest of the map has
+  // elsewhere, become parts of their own; those frames get their pose in the rest.
+  void CutAtLeaps(const std::function<bool()>& should_stop);
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops
@@ -184,9 +174,10 @@ class SlamSystem {
   Guarded<LoopReport> loop_report_;
   Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
   std::optional<DetectionStage> detection_;
-  FileBackedVector<TrackedFrame> tracked_;  // in the order of time
-  std::optional<Backfiller> backfiller_;    // offline, unless it is turned off
-  std::optional<PoseRefiner> refiner_;      // offline, unless it is turned off
+  TrackedFrames tracked_;
+  int pieces_cut_ = 0;
+  std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
+  std::optional<PoseRefiner> refiner_;    // offline, unless it is turned off
   BridgeFinder bridge_finder_;
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work

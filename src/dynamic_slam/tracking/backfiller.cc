@@ -26,9 +26,12 @@ Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint
     : options_(options), map_(map), finder_(camera, options, map), seed_(seed) {}
 
 void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
-  kept_.push_back(
+  auto next = kept_.end();
+  while (next != kept_.begin() && std::prev(next)->timestamp_s > frame.timestamp_s) --next;
+  const auto kept = kept_.insert(
+      next,
       {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
-  kept_.back().features.keypoints = FrameFinder::ReadKeypoints(frame);
+  kept->features.keypoints = FrameFinder::ReadKeypoints(frame);
   keypoints_ += frame.features.size();
   while (keypoints_ > kMaxKeypoints) {
     keypoints_ -= kept_.front().features.size();

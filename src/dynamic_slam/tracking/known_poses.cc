@@ -4,19 +4,13 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 
 #include "dynamic_slam/base/percentile.h"
+#include "dynamic_slam/geometry/path_leaps.h"
 
 namespace dynamic_slam {
 namespace {
-
-// From poses more frames away nobody knows where the camera is; a half more, as stamps are not even.
-constexpr double kMaxGapFrames = 4.5;
-
-// A camera that is so many times as fast as it nearly always was between two frames is a wrong pose: a few
-// landmarks found by chance, or on somebody who moves. With fewer steps known nobody can tell.
-constexpr double kMaxSpeedRatio = 2, kNearlyAlways = 0.95;
-constexpr size_t kMinSteps = 20;
 
 // A motion is not carried on for longer than so many times the time in which it was seen.
 constexpr double kMaxSteps = 5;
@@ -59,7 +53,7 @@ void KnownPoses::LearnMotion() {
     speeds[part].push_back((CentreOf(a, *map) - CentreOf(b, *map)).norm() / dt_s);
   }
   for (auto& [part, all] : speeds) {
-    if (all.size() >= kMinSteps) max_speed_[part] = kMaxSpeedRatio * Percentile(kNearlyAlways, &all);
+    if (const std::optional<double> most = MostSpeed(&all)) max_speed_[part] = *most;
   }
 }
 

@@ -100,6 +100,13 @@ Frame PoseRefiner::Restore(const KeptFrame& kept) const {
   return finder_.MakeFrame(kept.id, kept.timestamp_s, std::move(features), std::move(static_probability));
 }
 
+void PoseRefiner::ForEachOf(const std::set<double>& stamps,
+                            const std::function<void(const Frame&, int)>& fn) const {
+  for (const KeptFrame& kept : frames_) {
+    if (stamps.contains(kept.timestamp_s)) fn(Restore(kept), kept.min_inliers);
+  }
+}
+
 void PoseRefiner::Clear() {
   frames_.clear();
   keypoints_.clear();

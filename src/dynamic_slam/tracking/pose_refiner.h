@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,10 @@ class PoseRefiner {
   // frames after. `should_stop` may be empty; when it says so, that is all.
   std::vector<AnchoredPose> Refine(std::span<const AnchoredPose> known,
                                    const std::function<bool()>& should_stop);
+
+  // Calls fn(frame, min_inliers) for the frames that were kept of these stamps, in the order of time, as they
+  // were found: without a pose.
+  void ForEachOf(const std::set<double>& stamps, const std::function<void(const Frame&, int)>& fn) const;
 
   void Clear();
 

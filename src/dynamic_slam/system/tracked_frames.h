@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "dynamic_slam/base/file_backed_vector.h"
+#include "dynamic_slam/geometry/trajectory.h"
+#include "dynamic_slam/map/frame.h"
+#include "dynamic_slam/map/shared_map.h"
+
+namespace dynamic_slam {
+
+// The frames of a run that have a pose: each hangs on a keyframe, and is where the map puts that. They lie in
+// a file, as there is one for each image.
+class TrackedFrames {
+ public:
+  explicit TrackedFrames(SharedMap* map) : map_(map) {}
+
+  // A frame later than all others. is_live: not given its pose by a later frame.
+  void Add(const AnchoredPose& pose, bool is_live) { frames_.push_back(TrackedFrame(pose, is_live)); }
+  void RemoveLast() { frames_.pop_back(); }
+  void RemoveThoseOfErasedParts();
+  // In any order: frames that had none, or one that is given up.
+  void AddFound(std::span<const AnchoredPose> poses);
+  // Poses of frames that have one, in any order, instead.
+  void Refine(std::span<const AnchoredPose> poses);
+  void Clear() { frames_.clear(); }
+
+  // A piece of the path of a part of the map that is a part of its own now.
+  struct CutPiece {
+    PartId part, cut_from;
+  };
+
+  // Where the path of a part leaps, which the camera cannot have done, either that part does not fit together
+  // or the film has a cut. If nearly all of it is on one side of every leap, the rest is cut off.
+  std::vector<CutPiece> CutAtLeaps();
+
+  // Whether the piece stands wrong in what it was cut from: poses there that were found for its frames are
+  // elsewhere, most of them.
+  bool IsWrong(const CutPiece& piece, std::span<const AnchoredPose> found) const;
+
+  // The path of each part becomes what is most probable (SmoothPath). `should_stop` may be empty.
+  void Smooth(const std::function<bool()>& should_stop);
+
+  std::vector<AnchoredPose> Poses() const;
+  // The parts that have frames: the one with the most first.
+  std::vector<PartId> Parts() const;
+  Trajectory PathOf(PartId part) const;
+  size_t LiveCountOf(PartId part) const;
+
+ private:
+  // An AnchoredPose in half the room: float has it to 1e-7 of its length.
+  struct TrackedFrame {
+    double timestamp_s = 0;
+    KeyframeId reference;
+    bool is_live = false;
+    std::array<float, 4> rotation_xyzw{};
+    std::array<float, 3> translation{};
+
+    TrackedFrame(const AnchoredPose& pose, bool is_live_in);
+    AnchoredPose Pose() const;
+  };
+
+  // pieces: of each pose of the part's path. All but the first become parts of their own, if they have
+  // keyframes.
+  std::vector<CutPiece> Cut(PartId part, const Trajectory& path, std::span<const size_t> pieces);
+
+  std::vector<TrackedFrame> All() const { return {frames_.begin(), frames_.end()}; }
+
+  SharedMap* map_;
+  FileBackedVector<TrackedFrame> frames_;  // in the order of time
+};
+
+}  // namespace dynamic_slam
