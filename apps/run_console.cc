@@ -100,16 +100,14 @@ void PrintSummary(const RunSummary& summary) {
     fmt::print("no map was made: {}\n", summary.last_reason);
   }
   if (summary.pieces_cut > 0) {
-    fmt::print(
-        "{} of the path {} cut off, to {} (trajectory_2.txt, ...): the camera cannot have come from there\n",
-        summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
-        summary.pieces_cut == 1 ? "is" : "are",
-        summary.pieces_cut == 1 ? "a map of its own" : "maps of their own");
+    fmt::print("{} of the path stood wrong and {} cut off; what is not found again in the rest is apart\n",
+               summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
+               summary.pieces_cut == 1 ? "is" : "are");
   }
   for (const RunSummary::Leap& leap : summary.leaps) {
     fmt::print(
-        "the path leaps {:.2f} s after its begin, {:.1f} times faster than can be: one side of it stands "
-        "wrong\n",
+        "the path leaps {:.2f} s after the first frame, {:.1f} times faster than can be: unless the film has "
+        "a cut, one side stands wrong\n",
         leap.from_s - summary.frames[0].timestamp_s, leap.times_too_fast);
   }
   for (const SourceProblem& problem : summary.skipped)

@@ -15,6 +15,9 @@ constexpr size_t kMinSteps = 20;
 // Steps that are too fast belong to one leap when so few or fewer are between them.
 constexpr size_t kStepsBetween = 2;
 
+// A smooth path is over a leap by then. What is fast for longer is a camera that went off at last.
+constexpr size_t kMostSteps = 10;
+
 double Speed(const StampedPose& a, const StampedPose& b) {
   return (b.world_from_cam.translation - a.world_from_cam.translation).norm() /
          (b.timestamp_s - a.timestamp_s);
@@ -54,17 +57,20 @@ std::optional<double> LongestStep(const Trajectory& path) {
 std::vector<PathLeap> FindLeaps(const Trajectory& path) {
   std::vector<PathLeap> leaps;
   const std::optional<double> most = MostSpeedOf(path);
-  for (size_t i = 0; most.has_value() && i + 1 < path.size(); ++i) {
+  if (!most.has_value() || !(*most > 0)) return leaps;
+  for (size_t i = 0; i + 1 < path.size(); ++i) {
     const double speed = Speed(path[i], path[i + 1]);
     if (!(speed > *most)) continue;
     if (leaps.empty() || i > leaps.back().last + kStepsBetween) leaps.push_back({i, i, 0});
     leaps.back().last = i + 1;
     leaps.back().times_too_fast = std::max(leaps.back().times_too_fast, speed / *most);
   }
+  std::erase_if(leaps, [](const PathLeap& leap) { return leap.last - leap.first > kMostSteps; });
   return leaps;
 }
 
 std::vector<size_t> CutAt(const std::vector<PathLeap>& leaps, const Trajectory& path) {
+  if (path.empty()) return {};
   std::vector<size_t> begins{0};
   for (const PathLeap& leap : leaps) {
     size_t fastest = leap.first;
@@ -94,15 +100,16 @@ std::vector<size_t> CutAt(const std::vector<PathLeap>& leaps, const Trajectory& 
     pieces[piece] = {end - 1, pieces[piece].size + end - begin};
     piece_of.insert(piece_of.end(), end - begin, piece);
   }
-  const auto most_poses = std::max_element(pieces.begin(), pieces.end(),
+  const auto main =
+      static_cast<size_t>(std::max_element(pieces.begin(), pieces.end(),
                                            [](const Piece& a, const Piece& b) { return a.size < b.size; }) -
-                          pieces.begin();
-  for (size_t& piece : piece_of) {
-    if (piece == static_cast<size_t>(most_poses)) {
-      piece = 0;
-    } else if (piece == 0) {
-      piece = static_cast<size_t>(most_poses);
-    }
+                          pieces.begin());
+  // Each of the others stands for itself: what lies before the main one says nothing of what lies after it.
+  size_t count = 0;
+  for (size_t k = 0; k + 1 < begins.size(); ++k) {
+    const size_t number = piece_of[begins[k]] == main ? 0 : ++count;
+    std::fill(piece_of.begin() + static_cast<std::ptrdiff_t>(begins[k]),
+              piece_of.begin() + static_cast<std::ptrdiff_t>(begins[k + 1]), number);
   }
   return piece_of;
 }

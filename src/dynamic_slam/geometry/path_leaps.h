@@ -31,8 +31,7 @@ struct PathLeap {
 std::vector<PathLeap> FindLeaps(const Trajectory& path);
 
 // The path cut at its leaps, each at its fastest step: for each pose the number of its piece, 0 that of the
-// most poses. What lies before and after a piece is one piece when the camera can have come from one to the
-// other.
+// most poses. That one goes on after another when the camera can have come from one to the other.
 std::vector<size_t> CutAt(const std::vector<PathLeap>& leaps, const Trajectory& path);
 
 }  // namespace dynamic_slam

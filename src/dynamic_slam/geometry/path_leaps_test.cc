@@ -60,6 +60,18 @@ TEST(FindLeaps, WhatLeapsInSeveralStepsIsOne) {
   EXPECT_EQ(leaps[1].first, 199u);
 }
 
+TEST(FindLeaps, ACameraThatGoesOffAtLastDoesNotLeap) {
+  Trajectory path = Swing(300, 1e-3);
+  for (size_t i = 290; i < 300; ++i) Move(i, 0.02, &path);
+  ASSERT_EQ(FindLeaps(path).size(), 1u) << "ten steps can be one";
+  Move(289, 0.02, &path);
+  EXPECT_TRUE(FindLeaps(path).empty());
+  Trajectory still(300, StampedPose{});
+  for (size_t i = 0; i < still.size(); ++i) still[i].timestamp_s = static_cast<double>(i) / 30;
+  Move(150, 1, &still);
+  EXPECT_TRUE(FindLeaps(still).empty()) << "nobody knows how fast it can be";
+}
+
 TEST(FindLeaps, OfAFewPosesNobodyCanTell) {
   Trajectory path = Swing(20);
   Move(10, 50, &path);
@@ -83,7 +95,7 @@ TEST(CutAt, CutsALeapOfSeveralStepsOnce) {
   for (size_t i = 0; i < pieces.size(); ++i) EXPECT_EQ(pieces[i], i < 121 ? 1u : 0u) << i;
 }
 
-TEST(CutAt, WhatGoesOnAfterAPieceIsOne) {
+TEST(CutAt, TheMainPieceGoesOnAfterAnother) {
   Trajectory path = Swing(300);
   Move(100, 0.5, &path);
   Move(110, -0.5, &path);  // back
@@ -94,6 +106,16 @@ TEST(CutAt, WhatGoesOnAfterAPieceIsOne) {
     const size_t expected = i < 100 ? 0 : i < 110 ? 1 : i < 200 ? 0 : i < 210 ? 2 : 3;
     EXPECT_EQ(pieces[i], expected) << i;
   }
+}
+
+TEST(CutAt, BothEndsOfTheMainPieceStandForThemselves) {
+  Trajectory path = Swing(600);
+  Move(50, 1, &path);
+  Move(550, 1, &path);
+  const std::vector<size_t> pieces = CutAt(FindLeaps(path), path);
+  EXPECT_EQ(pieces[0], 1u);
+  EXPECT_EQ(pieces[300], 0u);
+  EXPECT_EQ(pieces[599], 2u);
 }
 
 TEST(CutAt, APathWithoutLeapsIsOnePiece) {

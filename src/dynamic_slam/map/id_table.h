@@ -17,6 +17,21 @@ namespace dynamic_slam {
 template <class IdType, class T>
 class IdTable {
  public:
+  IdTable() = default;
+  IdTable(IdTable&&) = default;
+  IdTable& operator=(IdTable&&) = default;
+  // The same values under the same ids, at addresses of their own.
+  IdTable(const IdTable& other) : created_(other.created_), size_(other.size_) {
+    for (const std::unique_ptr<Page>& page : other.pages_) {
+      pages_.push_back(page != nullptr ? std::make_unique<Page>() : nullptr);
+      if (page == nullptr) continue;
+      pages_.back()->size = page->size;
+      for (uint32_t i = 0; i < kPageSize; ++i) {
+        if (page->slots[i] != nullptr) pages_.back()->slots[i] = std::make_unique<T>(*page->slots[i]);
+      }
+    }
+  }
+
   // Constructs a value from (id, args...).
   template <class... Args>
   T& Emplace(Args&&... args) {

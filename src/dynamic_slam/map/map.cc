@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "dynamic_slam/base/dispatch.h"
@@ -83,6 +84,12 @@ void Map::Replace(Map other) {
   revision_ = revision + 1;
 }
 
+void Map::GoBackTo(Map earlier) {
+  const uint32_t revision = revision_;
+  *this = std::move(earlier);
+  revision_ = revision + 1;
+}
+
 Keyframe& Map::AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world,
                            FeatureSet features, KeypointGrid grid, std::vector<float> static_probability,
                            PartId part) {
@@ -105,6 +112,9 @@ std::vector<PartId> Map::Parts() const {
   for (uint32_t part = 0; part < origins_.size(); ++part) {
     if (keyframes_.Contains(origins_[part])) parts.emplace_back(part);
   }
+  // One that was split off may be older than what it was split from.
+  std::sort(parts.begin(), parts.end(),
+            [this](PartId a, PartId b) { return origins_[a.value()] < origins_[b.value()]; });
   return parts;
 }
 
@@ -153,6 +163,7 @@ PartId Map::SplitPart(const std::vector<KeyframeId>& keyframes) {
   const PartId from = keyframes_.At(keyframes.front()).part();
   const PartId part = BeginPart();
   for (const KeyframeId id : keyframes) keyframes_.At(id).part_ = part;
+  std::set<LandmarkId> changed;
   for (const KeyframeId id : keyframes) {
     const std::vector<LandmarkId> landmarks = keyframes_.At(id).landmarks_;
     for (const LandmarkId landmark : landmarks) {
@@ -164,12 +175,16 @@ PartId Map::SplitPart(const std::vector<KeyframeId>& keyframes) {
       const auto here = std::count_if(observations.begin(), observations.end(), is_here);
       const auto there = static_cast<std::ptrdiff_t>(observations.size()) - here;
       if (there == 0) continue;
+      changed.insert(landmark);
       for (const Observation& seen : observations) {
         // It may fall with an earlier one.
         if (is_here(seen) != (here > there) && landmarks_.Contains(landmark))
           Unlink(seen.keyframe, seen.keypoint);
       }
     }
+  }
+  for (const LandmarkId landmark : changed) {
+    if (landmarks_.Contains(landmark)) RefreshLandmark(landmark);
   }
   origins_[from.value()] = OldestOf(from);
   origins_[part.value()] = OldestOf(part);

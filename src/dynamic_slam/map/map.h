@@ -31,6 +31,8 @@ class Map {
   void Reset();
   // Becomes another map, as after Reset.
   void Replace(Map other);
+  // Becomes a copy of itself from before, and what was kept with it means the same again.
+  void GoBackTo(Map earlier);
   uint32_t epoch() const { return epoch_; }
 
   // Counts up when poses and points change all at once, for a loop or in the adjustment of everything: what
@@ -45,7 +47,7 @@ class Map {
   // A new part, which the next keyframe that is added to it is the origin of.
   PartId BeginPart();
 
-  // Parts with keyframes, oldest first.
+  // Parts with keyframes, in the order of their oldest ones.
   std::vector<PartId> Parts() const;
 
   // Whether the keyframe is the oldest of its part: nothing moves it but MergePart.

@@ -115,6 +115,15 @@ TEST_F(MapFileTest, WhatIsReadIsWhatWasWritten) {
   }
 }
 
+TEST_F(MapFileTest, APartThatWasSplitOffIsReadBack) {
+  TwoParts two;
+  two.synthetic.map.SplitPart({KeyframeId(0)});
+  ASSERT_EQ(two.map().Parts().size(), 3u);
+  const SavedMap read = DecodeMap(two.Encode(), "a.map");
+  EXPECT_EQ(read.map.Parts().size(), 3u);
+  EXPECT_THAT(read.map.Validate(), IsEmpty());
+}
+
 TEST_F(MapFileTest, WhatMovesIsNotSaved) {
   TwoParts saved;
   const size_t all = saved.map().landmarks().size();

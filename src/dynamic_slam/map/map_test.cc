@@ -398,7 +398,7 @@ TEST(MapTest, APartIsSplitBetweenItsKeyframes) {
                    mostly_first = link(2, {0, 1, 2}), mostly_second = link(3, {1, 2, 3, 4}),
                    of_neither = link(4, {1, 2});
   const PartId part = map.SplitPart({keyframes[0], keyframes[1]});
-  EXPECT_EQ(map.Parts(), (std::vector{PartId(0), part}));
+  EXPECT_EQ(map.Parts(), (std::vector{part, PartId(0)})) << "the oldest first";
   EXPECT_TRUE(map.IsOrigin(keyframes[0]) && map.IsOrigin(keyframes[2]));
   EXPECT_EQ(map.PartOf(keyframes[1]), part);
   EXPECT_EQ(map.PartOf(keyframes[4]), PartId(0));
@@ -410,6 +410,28 @@ TEST(MapTest, APartIsSplitBetweenItsKeyframes) {
   EXPECT_EQ(map.landmarks().At(mostly_second).observations().size(), 3u);
   EXPECT_FALSE(map.landmarks().Contains(of_neither)) << "one view is none";
   EXPECT_EQ(map.keyframes().At(keyframes[1]).WeightOf(keyframes[2]), 0);
+  EXPECT_THAT(map.Validate(), IsEmpty());
+}
+
+TEST(MapTest, ACopyStaysAsItWas) {
+  Map map = MakeMap();
+  const KeyframeId a = AddKeyframe(&map, 10), b = AddKeyframe(&map, 10), gone = AddKeyframe(&map, 10);
+  const LandmarkId id = map.AddLandmark({0, 0, 1}, a).id();
+  map.Link(a, 0, id);
+  map.Link(b, 0, id);
+  map.EraseKeyframe(gone, b);
+  const Map copy = map;
+  map.SplitPart({a});
+  map.keyframes().At(b).set_cam_from_world(Rigid3(Eigen::Quaterniond::Identity(), {1, 0, 0}));
+  EXPECT_FALSE(map.landmarks().Contains(id));
+  EXPECT_EQ(copy.Parts(), std::vector{PartId(0)});
+  ASSERT_TRUE(copy.landmarks().Contains(id));
+  EXPECT_EQ(copy.landmarks().At(id).observations().size(), 2u);
+  EXPECT_EQ(copy.keyframes().At(b).CenterInWorld().norm(), 0);
+  EXPECT_EQ(copy.keyframes().size(), 2u);
+  EXPECT_EQ(copy.keyframes().CreatedCount(), 3u);
+  EXPECT_EQ(copy.ResolveKeyframe(gone).keyframe, b);
+  EXPECT_THAT(copy.Validate(), IsEmpty());
   EXPECT_THAT(map.Validate(), IsEmpty());
 }
 

@@ -98,14 +98,15 @@ Json TilesSection(const Run& run) {
                          fmt::format("mean; detector {}", s.detector)));
   }
   if (!s.leaps.empty()) {
-    tiles.push_back(Tile("leaps of the path", fmt::format("{}", s.leaps.size()),
-                         fmt::format("the first at {:.2f} s: what is on one side of it stands wrong",
-                                     run.Since(s.leaps[0].from_s)),
-                         "bad"));
+    tiles.push_back(
+        Tile("leaps of the path", fmt::format("{}", s.leaps.size()),
+             fmt::format("the first at {:.2f} s: unless the film has a cut, one side stands wrong",
+                         run.Since(s.leaps[0].from_s)),
+             "bad"));
   }
   if (s.pieces_cut > 0) {
-    tiles.push_back(Tile("pieces cut off", fmt::format("{}", s.pieces_cut),
-                         "the camera cannot have come from there", "wait"));
+    tiles.push_back(
+        Tile("pieces cut off", fmt::format("{}", s.pieces_cut), "they stood wrong in the map", "wait"));
   }
   if (s.loops.corrected + s.loops.linked > 0) {
     tiles.push_back(Tile("loops closed", fmt::format("{}", s.loops.corrected + s.loops.linked),

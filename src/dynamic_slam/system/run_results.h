@@ -50,8 +50,8 @@ struct RunSummary {
   double startup_s = 0;  // from the start of the process to the first frame
   double wall_s = 0;     // from the first frame to the final map
   double peak_rss_mb = 0;
-  int pieces_cut = 0;  // of the path, that became maps of their own (SlamSystem::PiecesCut)
-  // Where the path of the main map leaps all the same: what is on one side stands wrong.
+  int pieces_cut = 0;  // of the path, that stood wrong (SlamSystem::PiecesCut)
+  // Where the path of the main map leaps: unless the film has a cut there, one side stands wrong.
   struct Leap {
     double from_s = 0, to_s = 0;  // stamps
     double times_too_fast = 1;    // PathLeap

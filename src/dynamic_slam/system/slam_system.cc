@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
-#include <map>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -248,7 +247,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) Backfill(false, should_stop);
   if (refiner_.has_value() && changes_map) tracked_.Refine(refiner_->Refine(tracked_.Poses(), should_stop));
-  if (changes_map && refiner_.has_value() && backfiller_.has_value()) CutAtLeaps(should_stop);
+  if (changes_map && refiner_.has_value() && backfiller_.has_value()) CutWrongPieces(should_stop);
   if (mode_ == RunMode::kOffline && options_.smooth_path) tracked_.Smooth(should_stop);
   return bundle;
 }
@@ -286,39 +285,48 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   }
 }
 
-void SlamSystem::CutAtLeaps(const std::function<bool()>& should_stop) {
-  const std::vector<TrackedFrames::CutPiece> pieces = tracked_.CutAtLeaps();
-  if (pieces.empty()) return;
-  std::map<double, PartId> cut;  // by stamp
+void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
+  std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  if (pieces.empty() || (should_stop && should_stop())) return;
   std::set<double> stamps;
-  for (const TrackedFrames::CutPiece& piece : pieces) {
-    for (const StampedPose& pose : tracked_.PathOf(piece.part)) {
-      cut[pose.timestamp_s] = piece.part;
-      stamps.insert(pose.timestamp_s);
-    }
+  for (const TrackedFrames::Piece& piece : pieces) {
+    for (const auto& [timestamp_s, centre] : piece.centres) stamps.insert(timestamp_s);
   }
   refiner_->ForEachOf(
       stamps, [this](const Frame& frame, int min_inliers) { backfiller_->Keep(frame, min_inliers, false); });
-  std::vector<AnchoredPose> known = tracked_.Poses();
-  std::erase_if(known, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
-  std::vector<AnchoredPose> found = backfiller_->Find(known, should_stop);
-  for (const TrackedFrames::CutPiece& piece : pieces) {
-    if (tracked_.IsWrong(piece, found)) {
-      ++pieces_cut_;
-      continue;
-    }
-    map_.Write()->MergePart(piece.part, piece.cut_from, Sim3());
-    std::erase_if(found, [&](const AnchoredPose& pose) {
-      const auto of_piece = cut.find(pose.timestamp_s);
-      return of_piece != cut.end() && of_piece->second == piece.part;
-    });
+
+  // For a trial, as a film with a cut leaps too.
+  Map map = *map_.Read();
+  const std::vector<AnchoredPose> poses = tracked_.Poses();
+  const auto known_without = [&](const std::set<double>& left_out) {
+    std::vector<AnchoredPose> known = tracked_.Poses();
+    std::erase_if(known, [&](const AnchoredPose& pose) { return left_out.contains(pose.timestamp_s); });
+    return known;
+  };
+  tracked_.CutOff(pieces);
+  std::vector<AnchoredPose> found = backfiller_->Find(known_without(stamps), should_stop);
+  const bool is_whole = !should_stop || !should_stop();
+  std::erase_if(pieces, [&](const TrackedFrames::Piece& piece) {
+    return !is_whole || !tracked_.IsWrong(piece, found);
+  });
+  map_.Write()->GoBackTo(std::move(map));
+  tracked_.Refine(poses);
+
+  std::set<double> wrong;
+  for (const TrackedFrames::Piece& piece : pieces) {
+    for (const auto& [timestamp_s, centre] : piece.centres) wrong.insert(timestamp_s);
   }
-  if (pieces_cut_ == 0) return;
+  if (wrong.empty()) return;
+  pieces_cut_ = static_cast<int>(pieces.size());
+  const std::vector<PartId> parts = tracked_.CutOff(pieces);
+  std::erase_if(found, [&](const AnchoredPose& pose) {
+    return stamps.contains(pose.timestamp_s) && !wrong.contains(pose.timestamp_s);
+  });
   tracked_.AddFound(found);
   const std::vector<PartId> with_frames = tracked_.Parts();
-  for (const TrackedFrames::CutPiece& piece : pieces) {
-    const bool is_left = std::find(with_frames.begin(), with_frames.end(), piece.part) != with_frames.end();
-    if (!is_left) map_.Write()->ErasePart(piece.part);  // if it is not joined again
+  for (const PartId part : parts) {
+    if (std::find(with_frames.begin(), with_frames.end(), part) == with_frames.end())
+      map_.Write()->ErasePart(part);
   }
 }
 

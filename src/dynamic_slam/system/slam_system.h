@@ -94,8 +94,9 @@ class SlamSystem {
 
   // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
   // poses of frames that have none yet, joins parts of which one goes on where another ends, tracks all
-  // frames once more, and smooths the path. Poses and landmarks are final after it. `should_stop` may be
-  // empty; when it says so, the adjustment ends with what it has. Does nothing after Stop().
+  // frames once more, cuts off what stands wrong, and smooths the path. Poses and landmarks are final after
+  // it. `should_stop` may be empty; when it says so, the adjustment ends with what it has. Does nothing after
+  // Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -117,7 +118,8 @@ class SlamSystem {
   // Frames of FrameTrajectory that had their pose when their turn came.
   size_t LiveFrameCount() const { return tracked_.LiveCountOf(OrMain({})); }
 
-  // Pieces of the path that Finish() made parts of their own, as they stood wrong in the map.
+  // Pieces of the path that stood wrong in the map: since Finish() their frames have their poses in the rest
+  // of it, or are in parts of their own.
   int PiecesCut() const { return pieces_cut_; }
 
   // None without a detector.
@@ -152,7 +154,7 @@ class SlamSystem {
   void CloseBorders(const std::function<bool()>& should_stop);
   // Pieces of the path from which the camera cannot have come, and whose frames the rest of the map has
   // elsewhere, become parts of their own; those frames get their pose in the rest.
-  void CutAtLeaps(const std::function<bool()>& should_stop);
+  void CutWrongPieces(const std::function<bool()>& should_stop);
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops

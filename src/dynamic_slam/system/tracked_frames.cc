@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -18,7 +17,7 @@ namespace {
 constexpr double kNearlyAll = 0.75;
 
 // By fewer poses that were found again nobody can tell whether a piece stands wrong.
-constexpr int kMinFound = 5;
+constexpr size_t kMinFound = 5;
 
 Rigid3 CamFromWorld(const Map& map, const AnchoredPose& pose) {
   return map.PoseFromReference(pose.reference, pose.cam_from_reference);
@@ -76,80 +75,84 @@ void TrackedFrames::Refine(std::span<const AnchoredPose> poses) {
   frames_.Assign(all);
 }
 
-std::vector<TrackedFrames::CutPiece> TrackedFrames::CutAtLeaps() {
-  std::vector<CutPiece> cut;
+std::vector<TrackedFrames::Piece> TrackedFrames::PiecesAtLeaps() const {
+  std::vector<Piece> pieces;
   for (const PartId part : Parts()) {
     const Trajectory path = PathOf(part);
-    const std::vector<size_t> pieces = CutAt(FindLeaps(Smoothed(path)), path);
-    const auto most = static_cast<double>(std::count(pieces.begin(), pieces.end(), size_t{0}));
-    if (most < kNearlyAll * static_cast<double>(path.size())) continue;
-    const std::vector<CutPiece> own = Cut(part, path, pieces);
-    cut.insert(cut.end(), own.begin(), own.end());
+    const std::vector<PathLeap> leaps = FindLeaps(Smoothed(path));
+    if (leaps.empty()) continue;
+    const std::vector<size_t> piece_of = CutAt(leaps, path);
+    Trajectory rest;
+    std::map<size_t, Piece> those;
+    for (size_t i = 0; i < path.size(); ++i) {
+      if (piece_of[i] == 0) {
+        rest.push_back(path[i]);
+      } else {
+        those[piece_of[i]].centres.emplace(path[i].timestamp_s, path[i].world_from_cam.translation);
+      }
+    }
+    const std::optional<double> longest_step = LongestStep(rest);
+    const double share = static_cast<double>(rest.size()) / static_cast<double>(path.size());
+    if (share < kNearlyAll || !longest_step.has_value()) continue;
+    for (auto& [number, piece] : those) pieces.push_back({part, std::move(piece.centres), *longest_step});
   }
-  return cut;
+  return pieces;
 }
 
-std::vector<TrackedFrames::CutPiece> TrackedFrames::Cut(PartId part, const Trajectory& path,
-                                                        std::span<const size_t> pieces) {
-  const size_t count = *std::max_element(pieces.begin(), pieces.end()) + 1;
-  if (count == 1) return {};
+std::vector<PartId> TrackedFrames::CutOff(std::span<const Piece> pieces) {
+  std::vector<PartId> parts;
+  for (const Piece& piece : pieces) {
+    if (const PartId part = CutOff(piece); part.IsValid()) parts.push_back(part);
+  }
+  return parts;
+}
+
+PartId TrackedFrames::CutOff(const Piece& piece) {
+  const double first_s = piece.centres.begin()->first, last_s = piece.centres.rbegin()->first;
+  const auto is_inside = [&](double timestamp_s) { return first_s <= timestamp_s && timestamp_s <= last_s; };
   const auto map = map_->Write();
-  // Of the pose that is nearest in time; those of a map that was loaded have other stamps.
-  std::vector<std::vector<KeyframeId>> keyframes(count);
+  std::vector<KeyframeId> inside, outside;
   map->keyframes().ForEach([&](const Keyframe& keyframe) {
-    if (keyframe.part() != part) return;
-    const auto next = std::lower_bound(
-        path.begin(), path.end(), keyframe.timestamp_s(),
-        [](const StampedPose& pose, double timestamp_s) { return pose.timestamp_s < timestamp_s; });
-    const auto pose = static_cast<size_t>((next == path.end() ? std::prev(next) : next) - path.begin());
-    keyframes[keyframe.frame_id().IsValid() ? pieces[pose] : 0].push_back(keyframe.id());
+    if (keyframe.part() != piece.part || !keyframe.frame_id().IsValid()) return;  // of this run
+    (is_inside(keyframe.timestamp_s()) ? inside : outside).push_back(keyframe.id());
   });
-  if (keyframes[0].empty()) return {};
-  std::vector<size_t> of_part;
-  for (size_t i = 0; i < frames_.size(); ++i) {
-    if (map->PartOf(frames_[i].reference) == part) of_part.push_back(i);
-  }
-  std::vector<PartId> parts(count, part);
-  std::vector<CutPiece> cut;
-  for (size_t k = 1; k < count; ++k) {
-    if (keyframes[k].empty()) continue;
-    parts[k] = map->SplitPart(keyframes[k]);
-    cut.push_back({parts[k], part});
-  }
+  if (inside.empty() || outside.empty()) return {};
   std::vector<TrackedFrame> all = All();
-  for (size_t i = 0; i < path.size(); ++i) {
-    TrackedFrame& frame = all[of_part[i]];
-    const size_t k = keyframes[pieces[i]].empty() ? 0 : pieces[i];
-    if (map->PartOf(frame.reference) == parts[k]) continue;
+  std::vector<std::pair<size_t, Rigid3>> of_part;  // where they are
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (map->PartOf(all[i].reference) == piece.part)
+      of_part.emplace_back(i, CamFromWorld(*map, all[i].Pose()));
+  }
+  const PartId own = map->SplitPart(inside);
+  for (const auto& [i, cam_from_world] : of_part) {
+    TrackedFrame& frame = all[i];
+    const bool is_of_piece = piece.centres.contains(frame.timestamp_s);
+    if (map->PartOf(frame.reference) == (is_of_piece ? own : piece.part)) continue;
+    const std::vector<KeyframeId>& keyframes = is_of_piece ? inside : outside;
     const auto away_s = [&](KeyframeId id) {
       return std::abs(map->keyframes().At(id).timestamp_s() - frame.timestamp_s);
     };
     const KeyframeId nearest =
-        *std::min_element(keyframes[k].begin(), keyframes[k].end(),
+        *std::min_element(keyframes.begin(), keyframes.end(),
                           [&](KeyframeId a, KeyframeId b) { return away_s(a) < away_s(b); });
-    const Rigid3 cam_from_nearest = map->CamFromReference(nearest, path[i].world_from_cam.Inverse());
-    frame = TrackedFrame({frame.timestamp_s, nearest, cam_from_nearest}, frame.is_live);
+    frame = TrackedFrame({frame.timestamp_s, nearest, map->CamFromReference(nearest, cam_from_world)},
+                         frame.is_live);
   }
   frames_.Assign(all);
-  return cut;
+  return own;
 }
 
-bool TrackedFrames::IsWrong(const CutPiece& piece, std::span<const AnchoredPose> found) const {
-  const std::optional<double> longest = LongestStep(PathOf(piece.cut_from));
-  if (!longest.has_value()) return false;
-  std::map<double, Eigen::Vector3d> in_piece;
-  for (const StampedPose& pose : PathOf(piece.part))
-    in_piece.emplace(pose.timestamp_s, pose.world_from_cam.translation);
-  int elsewhere = 0, count = 0;
+bool TrackedFrames::IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const {
+  size_t elsewhere = 0, count = 0;
   const auto map = map_->Read();
   for (const AnchoredPose& pose : found) {
-    const auto before = in_piece.find(pose.timestamp_s);
-    if (before == in_piece.end() || map->PartOf(pose.reference) != piece.cut_from) continue;
-    const Eigen::Vector3d now = CamFromWorld(*map, pose).Inverse().translation;
+    const auto before = piece.centres.find(pose.timestamp_s);
+    if (before == piece.centres.end() || map->PartOf(pose.reference) != piece.part) continue;
+    const Eigen::Vector3d now = CamFromWorld(*map, pose).TargetOriginInSource();
     ++count;
-    elsewhere += (now - before->second).norm() > *longest;
+    elsewhere += (now - before->second).norm() > piece.longest_step;
   }
-  return count >= kMinFound && 2 * elsewhere > count;
+  return count >= kMinFound && 2 * count > piece.centres.size() && 2 * elsewhere > count;
 }
 
 void TrackedFrames::Smooth(const std::function<bool()>& should_stop) {

@@ -3,8 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "dynamic_slam/base/file_backed_vector.h"
 #include "dynamic_slam/geometry/trajectory.h"
@@ -29,18 +32,24 @@ class TrackedFrames {
   void Refine(std::span<const AnchoredPose> poses);
   void Clear() { frames_.clear(); }
 
-  // A piece of the path of a part of the map that is a part of its own now.
-  struct CutPiece {
-    PartId part, cut_from;
+  // Frames of a part of the map that may stand wrong in it.
+  struct Piece {
+    PartId part;
+    std::map<double, Eigen::Vector3d> centres;  // of the camera, by stamp
+    double longest_step;                        // of the rest of the part (LongestStep)
   };
 
   // Where the path of a part leaps, which the camera cannot have done, either that part does not fit together
-  // or the film has a cut. If nearly all of it is on one side of every leap, the rest is cut off.
-  std::vector<CutPiece> CutAtLeaps();
+  // or the film has a cut. If nearly all of it is on one side of every leap: what is on the other.
+  std::vector<Piece> PiecesAtLeaps() const;
 
-  // Whether the piece stands wrong in what it was cut from: poses there that were found for its frames are
-  // elsewhere, most of them.
-  bool IsWrong(const CutPiece& piece, std::span<const AnchoredPose> found) const;
+  // Keyframes of the pieces become parts of their own, one for each piece that has some, and its frames hang
+  // on these; all others hang on the rest. Returns those parts.
+  std::vector<PartId> CutOff(std::span<const Piece> pieces);
+
+  // Whether the piece stood wrong in its part: of most of its frames a pose was found in the rest, and most
+  // of these are farther away than the camera moves from one frame to the next.
+  bool IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const;
 
   // The path of each part becomes what is most probable (SmoothPath). `should_stop` may be empty.
   void Smooth(const std::function<bool()>& should_stop);
@@ -64,9 +73,7 @@ class TrackedFrames {
     AnchoredPose Pose() const;
   };
 
-  // pieces: of each pose of the part's path. All but the first become parts of their own, if they have
-  // keyframes.
-  std::vector<CutPiece> Cut(PartId part, const Trajectory& path, std::span<const size_t> pieces);
+  PartId CutOff(const Piece& piece);
 
   std::vector<TrackedFrame> All() const { return {frames_.begin(), frames_.end()}; }
 

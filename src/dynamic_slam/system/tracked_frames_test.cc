@@ -56,44 +56,50 @@ class TrackedFramesTest : public testing::Test {
 
 TEST_F(TrackedFramesTest, APathWithoutLeapsStaysWhole) {
   Go(100, 100, 100);
-  EXPECT_THAT(tracked_.CutAtLeaps(), IsEmpty());
+  EXPECT_THAT(tracked_.PiecesAtLeaps(), IsEmpty());
   ExpectPath(PartId(0), 0, 100, 0);
 }
 
 TEST_F(TrackedFramesTest, WhatLiesBeforeALeapBecomesAPartOfItsOwn) {
   Go(100, 0, 18);
   // From frame 18 on the camera is elsewhere; 18 and 19 hang on the keyframe of before.
-  const std::vector<TrackedFrames::CutPiece> cut = tracked_.CutAtLeaps();
+  const std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  const std::vector<PartId> cut = tracked_.CutOff(pieces);
   ASSERT_EQ(cut.size(), 1u);
-  EXPECT_EQ(tracked_.Parts(), (std::vector{PartId(0), cut[0].part}));
+  EXPECT_EQ(tracked_.Parts(), (std::vector{PartId(0), cut[0]}));
   ExpectPath(PartId(0), 18, 100, 0);
-  ExpectPath(cut[0].part, 0, 18, kAway);
+  ExpectPath(cut[0], 0, 18, kAway);
   EXPECT_EQ(tracked_.LiveCountOf(PartId(0)), 82u);
   const auto map = map_.Read();
-  EXPECT_EQ(map->keyframes().At(keyframes_[1]).part(), cut[0].part);
+  EXPECT_EQ(map->keyframes().At(keyframes_[1]).part(), cut[0]);
   EXPECT_EQ(map->keyframes().At(keyframes_[2]).part(), PartId(0));
   EXPECT_THAT(map->Validate(), IsEmpty());
 }
 
 TEST_F(TrackedFramesTest, APieceBetweenLeapsIsCutOut) {
   Go(100, 45, 56);
-  const std::vector<TrackedFrames::CutPiece> cut = tracked_.CutAtLeaps();
+  const std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  const std::vector<PartId> cut = tracked_.CutOff(pieces);
   ASSERT_EQ(cut.size(), 1u);
-  ExpectPath(cut[0].part, 45, 56, kAway);
+  ExpectPath(cut[0], 45, 56, kAway);
   EXPECT_EQ(tracked_.PathOf(PartId(0)).size(), 89u);
   EXPECT_THAT(map_.Read()->Validate(), IsEmpty());
 }
 
 TEST_F(TrackedFramesTest, APieceWithoutKeyframeStays) {
   Go(100, 41, 50);
-  EXPECT_THAT(tracked_.CutAtLeaps(), IsEmpty());
+  const std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  ASSERT_EQ(pieces.size(), 1u);
+  EXPECT_THAT(tracked_.CutOff(pieces), IsEmpty());
   EXPECT_EQ(tracked_.PathOf(PartId(0)).size(), 100u);
 }
 
 TEST_F(TrackedFramesTest, APieceIsWrongWhereItsFramesAreFoundElsewhere) {
   Go(100, 0, 18);
-  const std::vector<TrackedFrames::CutPiece> cut = tracked_.CutAtLeaps();
-  ASSERT_EQ(cut.size(), 1u);
+  const std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  ASSERT_EQ(pieces.size(), 1u);
+  EXPECT_EQ(pieces[0].centres.size(), 18u);
+  ASSERT_EQ(tracked_.CutOff(pieces).size(), 1u);
   const auto found = [&](size_t count, double away) {
     std::vector<AnchoredPose> poses;
     for (size_t i = 0; i < count; ++i) {
@@ -103,19 +109,19 @@ TEST_F(TrackedFramesTest, APieceIsWrongWhereItsFramesAreFoundElsewhere) {
     return poses;
   };
   // The camera can have moved by 0.2 from one frame to the next.
-  EXPECT_TRUE(tracked_.IsWrong(cut[0], found(10, -kAway)));
-  EXPECT_TRUE(tracked_.IsWrong(cut[0], found(10, 0.25)));
-  EXPECT_FALSE(tracked_.IsWrong(cut[0], found(10, 0.15))) << "a cut of the film";
-  EXPECT_FALSE(tracked_.IsWrong(cut[0], found(4, -kAway))) << "by chance";
-  EXPECT_FALSE(tracked_.IsWrong(cut[0], {}));
-  std::vector<AnchoredPose> mixed = found(10, 0);
-  for (size_t i = 0; i < 5; ++i) mixed[i] = found(10, -kAway)[i];
-  EXPECT_FALSE(tracked_.IsWrong(cut[0], mixed));
+  EXPECT_TRUE(tracked_.IsWrong(pieces[0], found(12, -kAway)));
+  EXPECT_TRUE(tracked_.IsWrong(pieces[0], found(12, 0.25)));
+  EXPECT_FALSE(tracked_.IsWrong(pieces[0], found(12, 0.15))) << "a cut of the film";
+  EXPECT_FALSE(tracked_.IsWrong(pieces[0], found(9, -kAway))) << "half of the frames";
+  EXPECT_FALSE(tracked_.IsWrong(pieces[0], {}));
+  std::vector<AnchoredPose> mixed = found(12, 0);
+  for (size_t i = 0; i < 6; ++i) mixed[i] = found(12, -kAway)[i];
+  EXPECT_FALSE(tracked_.IsWrong(pieces[0], mixed));
 }
 
 TEST_F(TrackedFramesTest, OfTwoHalvesNobodyCanTellWhichStandsWrong) {
   Go(100, 0, 45);
-  EXPECT_THAT(tracked_.CutAtLeaps(), IsEmpty());
+  EXPECT_THAT(tracked_.PiecesAtLeaps(), IsEmpty());
   EXPECT_EQ(tracked_.PathOf(PartId(0)).size(), 100u);
 }
 

@@ -28,6 +28,7 @@ Backfiller::Backfiller(const Camera& camera, const TrackerOptions& options, uint
 void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
   auto next = kept_.end();
   while (next != kept_.begin() && std::prev(next)->timestamp_s > frame.timestamp_s) --next;
+  if (next != kept_.begin() && std::prev(next)->timestamp_s == frame.timestamp_s) return;
   const auto kept = kept_.insert(
       next,
       {frame.id, frame.timestamp_s, frame.features, frame.static_probability, min_inliers, has_pose, {}});
