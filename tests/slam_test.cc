@@ -242,6 +242,23 @@ TEST_F(SystemTest, AFoundPlaceThatTheNextImageDoesNotConfirmIsWithdrawn) {
   }
 }
 
+TEST_F(SystemTest, AFilmWithACutInOnePlaceLeapsAndStaysWhole) {
+  const Room room = MakeRoom(120);
+  const WholeRun run = RunImages(Join(Frames(room, 0, 120), Frames(room, 20, 50)));
+  const RunSummary& summary = run.summary;
+  EXPECT_EQ(summary.maps, 1u);
+  EXPECT_EQ(summary.pieces_cut, 0) << "nothing stands wrong";
+  ASSERT_EQ(summary.leaps.size(), 1u);
+  EXPECT_NEAR(summary.leaps[0].from_s, summary.frames[119].timestamp_s, 0.2);
+  const Trajectory path = run.system->FrameTrajectory();
+  ASSERT_GE(path.size(), 148u);
+  // Counted from the end, as the one at the cut may have none: where they were the first time.
+  const auto at = [](auto pose) -> Eigen::Vector3d { return pose->world_from_cam.translation; };
+  const double went = (at(path.begin() + 119) - at(path.begin() + 20)).norm();
+  for (int frame = 25; frame < 50; ++frame)
+    EXPECT_LT((at(path.end() - 50 + frame) - at(path.begin() + frame)).norm(), 0.02 * went) << frame;
+}
+
 TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
   const Room room = MakeRoom(150), other = MakeRoom(60, 2);
   const WholeRun run =
