@@ -298,13 +298,10 @@ void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
   // For a trial, as a film with a cut leaps too.
   Map map = *map_.Read();
   const std::vector<AnchoredPose> poses = tracked_.Poses();
-  const auto known_without = [&](const std::set<double>& left_out) {
-    std::vector<AnchoredPose> known = tracked_.Poses();
-    std::erase_if(known, [&](const AnchoredPose& pose) { return left_out.contains(pose.timestamp_s); });
-    return known;
-  };
   tracked_.CutOff(pieces);
-  std::vector<AnchoredPose> found = backfiller_->Find(known_without(stamps), should_stop);
+  std::vector<AnchoredPose> known = tracked_.Poses();
+  std::erase_if(known, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
+  std::vector<AnchoredPose> found = backfiller_->Find(known, should_stop);
   const bool is_whole = !should_stop || !should_stop();
   std::erase_if(pieces, [&](const TrackedFrames::Piece& piece) {
     return !is_whole || !tracked_.IsWrong(piece, found);
