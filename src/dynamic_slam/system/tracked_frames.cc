@@ -16,8 +16,10 @@ namespace {
 // With this share of its frames on one side of all leaps it is clear which side stands wrong: the other.
 constexpr double kNearlyAll = 0.75;
 
-// By fewer poses that were found again nobody can tell whether a piece stands wrong.
+// By fewer poses that were found again nobody can tell whether a piece stands wrong: a few are found by
+// chance, and where tracking was about to be lost it is wrong for a moment only.
 constexpr size_t kMinFound = 5;
+constexpr double kMinFoundShare = 0.25;
 
 Rigid3 CamFromWorld(const Map& map, const AnchoredPose& pose) {
   return map.PoseFromReference(pose.reference, pose.cam_from_reference);
@@ -152,7 +154,8 @@ bool TrackedFrames::IsWrong(const Piece& piece, std::span<const AnchoredPose> fo
     ++count;
     elsewhere += (now - before->second).norm() > piece.longest_step;
   }
-  return count >= kMinFound && 2 * count > piece.centres.size() && 2 * elsewhere > count;
+  const double share = static_cast<double>(count) / static_cast<double>(piece.centres.size());
+  return count >= kMinFound && share >= kMinFoundShare && 2 * elsewhere > count;
 }
 
 void TrackedFrames::Smooth(const std::function<bool()>& should_stop) {

@@ -47,8 +47,8 @@ class TrackedFrames {
   // on these; all others hang on the rest. Returns those parts.
   std::vector<PartId> CutOff(std::span<const Piece> pieces);
 
-  // Whether the piece stood wrong in its part: of most of its frames a pose was found in the rest, and most
-  // of these are farther away than the camera moves from one frame to the next.
+  // Whether the piece stood wrong in its part: of a quarter of its frames or more a pose was found in the
+  // rest, and most of these are farther away than the camera moves from one frame to the next.
   bool IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const;
 
   // The path of each part becomes what is most probable (SmoothPath). `should_stop` may be empty.

@@ -112,7 +112,7 @@ TEST_F(TrackedFramesTest, APieceIsWrongWhereItsFramesAreFoundElsewhere) {
   EXPECT_TRUE(tracked_.IsWrong(pieces[0], found(12, -kAway)));
   EXPECT_TRUE(tracked_.IsWrong(pieces[0], found(12, 0.25)));
   EXPECT_FALSE(tracked_.IsWrong(pieces[0], found(12, 0.15))) << "a cut of the film";
-  EXPECT_FALSE(tracked_.IsWrong(pieces[0], found(9, -kAway))) << "half of the frames";
+  EXPECT_FALSE(tracked_.IsWrong(pieces[0], found(4, -kAway))) << "fewer than a quarter";
   EXPECT_FALSE(tracked_.IsWrong(pieces[0], {}));
   std::vector<AnchoredPose> mixed = found(12, 0);
   for (size_t i = 0; i < 6; ++i) mixed[i] = found(12, -kAway)[i];
