@@ -104,7 +104,7 @@ void PrintSummary(const RunSummary& summary) {
                summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
                summary.pieces_cut == 1 ? "is" : "are");
   }
-  for (const RunSummary::Leap& leap : summary.leaps) {
+  for (const PathLeap& leap : summary.leaps) {
     fmt::print(
         "the path leaps {:.2f} s after the first frame, {:.1f} times faster than can be: unless the film has "
         "a cut, one side stands wrong\n",

@@ -61,8 +61,10 @@ std::vector<PathLeap> FindLeaps(const Trajectory& path) {
   for (size_t i = 0; i + 1 < path.size(); ++i) {
     const double speed = Speed(path[i], path[i + 1]);
     if (!(speed > *most)) continue;
-    if (leaps.empty() || i > leaps.back().last + kStepsBetween) leaps.push_back({i, i, 0});
+    if (leaps.empty() || i > leaps.back().last + kStepsBetween)
+      leaps.push_back({i, i, path[i].timestamp_s, 0, 0});
     leaps.back().last = i + 1;
+    leaps.back().to_s = path[i + 1].timestamp_s;
     leaps.back().times_too_fast = std::max(leaps.back().times_too_fast, speed / *most);
   }
   std::erase_if(leaps, [](const PathLeap& leap) { return leap.last - leap.first > kMostSteps; });

@@ -22,9 +22,10 @@ std::optional<double> LongestStep(const Trajectory& path);
 // Where a camera cannot have come from one pose of its path to another as fast as the path says. Between them
 // the map does not fit together, and what is on one side of the leap stands wrong.
 struct PathLeap {
-  size_t first = 0,
-         last = 0;  // poses, next to each other or nearly so, as a smooth path leaps in several steps
-  double times_too_fast = 1;  // its greatest speed, over the most that a camera can have had
+  // Of the poses, next to each other or nearly so, as a smooth path leaps in several steps.
+  size_t first = 0, last = 0;
+  double from_s = 0, to_s = 0;  // their stamps
+  double times_too_fast = 1;    // its greatest speed, over the most that a camera can have had
 };
 
 // In the order of time. The path tells by itself how fast the camera was.

@@ -82,7 +82,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                           {"final_cost", summary.final_bundle.final_cost}};
   json["pieces_cut"] = summary.pieces_cut;
   json["leaps"] = nlohmann::ordered_json::array();
-  for (const RunSummary::Leap& leap : summary.leaps) {
+  for (const PathLeap& leap : summary.leaps) {
     json["leaps"].push_back(
         {{"from", leap.from_s}, {"to", leap.to_s}, {"times_too_fast", leap.times_too_fast}});
   }

@@ -13,6 +13,7 @@
 
 #include "dynamic_slam/base/file_backed_vector.h"
 #include "dynamic_slam/geometry/metric_scale.h"
+#include "dynamic_slam/geometry/path_leaps.h"
 #include "dynamic_slam/io/frame_source.h"
 #include "dynamic_slam/system/slam_system.h"
 
@@ -52,11 +53,7 @@ struct RunSummary {
   double peak_rss_mb = 0;
   int pieces_cut = 0;  // of the path, that stood wrong (SlamSystem::PiecesCut)
   // Where the path of the main map leaps: unless the film has a cut there, one side stands wrong.
-  struct Leap {
-    double from_s = 0, to_s = 0;  // stamps
-    double times_too_fast = 1;    // PathLeap
-  };
-  std::vector<Leap> leaps;
+  std::vector<PathLeap> leaps;
   std::optional<MetricScale> scale;  // of the main part of the map, if anything says how long its unit is
   bool interrupted = false;
   std::exception_ptr failure;          // what ended the run early, if anything was thrown

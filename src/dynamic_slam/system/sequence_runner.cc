@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include "dynamic_slam/base/error.h"
-#include "dynamic_slam/geometry/path_leaps.h"
 #include "dynamic_slam/system/frame_feed.h"
 
 namespace dynamic_slam {
@@ -156,9 +155,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
   const Trajectory path = system.FrameTrajectory();
   summary.frames_backfilled = path.size() - summary.frames_tracked;
   summary.pieces_cut = system.PiecesCut();
-  for (const PathLeap& leap : FindLeaps(path)) {
-    summary.leaps.push_back({path[leap.first].timestamp_s, path[leap.last].timestamp_s, leap.times_too_fast});
-  }
+  summary.leaps = FindLeaps(path);
   {
     const auto map = system.map().Read();
     summary.keyframes = map->keyframes().size();

@@ -246,7 +246,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) Backfill(false, should_stop);
-  if (refiner_.has_value() && changes_map) tracked_.Refine(refiner_->Refine(tracked_.Poses(), should_stop));
+  if (refiner_.has_value() && changes_map) tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
   if (changes_map && refiner_.has_value() && backfiller_.has_value()) CutWrongPieces(should_stop);
   if (mode_ == RunMode::kOffline && options_.smooth_path) tracked_.Smooth(should_stop);
   return bundle;
@@ -286,7 +286,7 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
 }
 
 void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
-  std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  const std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
   if (pieces.empty() || (should_stop && should_stop())) return;
   std::set<double> stamps;
   for (const TrackedFrames::Piece& piece : pieces) {
@@ -303,22 +303,21 @@ void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
   std::erase_if(known, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
   std::vector<AnchoredPose> found = backfiller_->Find(known, should_stop);
   const bool is_whole = !should_stop || !should_stop();
-  std::erase_if(pieces, [&](const TrackedFrames::Piece& piece) {
-    return !is_whole || !tracked_.IsWrong(piece, found);
-  });
-  map_.Write()->GoBackTo(std::move(map));
-  tracked_.Refine(poses);
-
-  std::set<double> wrong;
+  std::vector<TrackedFrames::Piece> wrong;
   for (const TrackedFrames::Piece& piece : pieces) {
-    for (const auto& [timestamp_s, centre] : piece.centres) wrong.insert(timestamp_s);
+    if (is_whole && tracked_.IsWrong(piece, found)) {
+      wrong.push_back(piece);
+    } else {
+      std::erase_if(found,
+                    [&](const AnchoredPose& pose) { return piece.centres.contains(pose.timestamp_s); });
+    }
   }
+  map_.Write()->GoBackTo(std::move(map));
+  tracked_.Replace(poses);
+
   if (wrong.empty()) return;
-  pieces_cut_ = static_cast<int>(pieces.size());
-  const std::vector<PartId> parts = tracked_.CutOff(pieces);
-  std::erase_if(found, [&](const AnchoredPose& pose) {
-    return stamps.contains(pose.timestamp_s) && !wrong.contains(pose.timestamp_s);
-  });
+  pieces_cut_ = static_cast<int>(wrong.size());
+  const std::vector<PartId> parts = tracked_.CutOff(wrong);
   tracked_.AddFound(found);
   const std::vector<PartId> with_frames = tracked_.Parts();
   for (const PartId part : parts) {

@@ -66,7 +66,7 @@ void TrackedFrames::AddFound(std::span<const AnchoredPose> poses) {
   frames_.Assign(all);
 }
 
-void TrackedFrames::Refine(std::span<const AnchoredPose> poses) {
+void TrackedFrames::Replace(std::span<const AnchoredPose> poses) {
   std::map<double, AnchoredPose> by_stamp;
   for (const AnchoredPose& pose : poses) by_stamp.emplace(pose.timestamp_s, pose);
   std::vector<TrackedFrame> all = All();
@@ -173,7 +173,7 @@ void TrackedFrames::Smooth(const std::function<bool()>& should_stop) {
         ++next;
       }
     }
-    Refine(poses);
+    Replace(poses);
   }
 }
 

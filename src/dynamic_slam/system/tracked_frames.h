@@ -29,7 +29,7 @@ class TrackedFrames {
   // In any order: frames that had none, or one that is given up.
   void AddFound(std::span<const AnchoredPose> poses);
   // Poses of frames that have one, in any order, instead.
-  void Refine(std::span<const AnchoredPose> poses);
+  void Replace(std::span<const AnchoredPose> poses);
   void Clear() { frames_.clear(); }
 
   // Frames of a part of the map that may stand wrong in it.

@@ -25,8 +25,8 @@ class Backfiller {
  public:
   Backfiller(const Camera& camera, const TrackerOptions& options, uint64_t seed, SharedMap* map);
 
-  // Keeps what is needed of a frame. has_pose: it has one, but may lose it yet. The oldest frames are
-  // forgotten when all together have more than two million keypoints (130 MB).
+  // Keeps what is needed of a frame, unless it is kept already. has_pose: it has one, but may lose it yet.
+  // The oldest frames are forgotten when all together have more than two million keypoints (130 MB).
   void Keep(const Frame& frame, int min_inliers, bool has_pose);
 
   // No frame will lose its pose any more: those that have one are forgotten.
