@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,6 +28,15 @@ class KeypointGrid {
   void Build(const FeatureSet& features, const std::array<double, 4>& bounds);
 
   size_t size() const { return cell_of_.size(); }
+
+  // Calls fn(std::span<const uint32_t> indices) for each cell that has keypoints, row-major.
+  template <class Fn>
+  void ForEachCell(Fn&& fn) const {
+    for (size_t cell = 0; cell + 1 < cell_begin_.size(); ++cell) {
+      const uint32_t begin = cell_begin_[cell], end = cell_begin_[cell + 1];
+      if (begin < end) fn(std::span(index_.data() + begin, end - begin));
+    }
+  }
 
   // Calls fn(uint32_t index) for each keypoint at a distance <= radius_px from the ideal pixel (x, y) and of
   // an octave from min_octave to max_octave, and for no other, cell by cell (row-major), in a cell by index.

@@ -1,6 +1,9 @@
 #include "dynamic_slam/features/keypoint_grid.h"
 
+#include <cmath>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,6 +39,35 @@ std::vector<uint32_t> Query(const KeypointGrid& grid, float x, float y, float ra
   grid.ForEachInWindow(x, y, radius_px, min_octave, max_octave,
                        [&](uint32_t index) { found.push_back(index); });
   return found;
+}
+
+TEST(KeypointGrid, EachKeypointIsInOneCellWithThoseAroundIt) {
+  const FeatureSet features = RandomFeatures(1500, 5);
+  KeypointGrid grid;
+  grid.Build(features, kBounds);
+  std::vector<int> cell_of(features.size(), -1);
+  int cells = 0;
+  grid.ForEachCell([&](std::span<const uint32_t> keypoints) {
+    ASSERT_FALSE(keypoints.empty());
+    for (const uint32_t i : keypoints) {
+      EXPECT_EQ(cell_of[i], -1);
+      cell_of[i] = cells;
+    }
+    ++cells;
+  });
+  const auto inside = [&](const Keypoint& k) {
+    return k.x > kBounds[0] && k.x < kBounds[2] && k.y > kBounds[1] && k.y < kBounds[3];
+  };
+  const auto column = [&](float x) { return std::floor((x - kBounds[0]) / KeypointGrid::kCellSizePx); };
+  const auto row = [&](float y) { return std::floor((y - kBounds[1]) / KeypointGrid::kCellSizePx); };
+  for (size_t i = 0; i < features.size(); ++i) {
+    ASSERT_GE(cell_of[i], 0);
+    for (size_t j = 0; j < i; ++j) {
+      const Keypoint &a = features.keypoints[i], &b = features.keypoints[j];
+      if (!inside(a) || !inside(b)) continue;  // in the nearest cell of the border
+      EXPECT_EQ(cell_of[i] == cell_of[j], column(a.x) == column(b.x) && row(a.y) == row(b.y));
+    }
+  }
 }
 
 TEST(KeypointGrid, FindsExactlyWhatBruteForceFinds) {

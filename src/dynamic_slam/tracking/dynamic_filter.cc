@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -12,6 +13,7 @@
 #include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/semantics/selective_tracking.h"
 #include "dynamic_slam/tracking/rest_flow.h"
+#include "dynamic_slam/tracking/witnesses.h"
 
 namespace dynamic_slam {
 namespace {
@@ -51,12 +53,19 @@ double Sigmoid(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
 double Square(double x) { return x * x; }
 
+// How a keypoint moved tells so much more of whether it is at rest.
+void AddEvidence(double log_odds, float* motion_log_odds) {
+  *motion_log_odds =
+      std::clamp(*motion_log_odds + static_cast<float>(log_odds), -kMaxStaticLogOdds, kMaxStaticLogOdds);
+}
+
 }  // namespace
 
 DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options,
                              std::vector<float> octave_scales)
     : camera_(camera),
       options_(options),
+      is_weighing_(options.method == "weights"),
       octave_scales_(std::move(octave_scales)),
       past_views_(camera, octave_scales_) {}
 
@@ -100,20 +109,29 @@ bool DynamicFilter::OnlyBoxesMove(std::span<const PointMotion> motions) const {
   return *upper > kMoves_px;
 }
 
-float DynamicFilter::Combine(float prior, float motion_log_odds) const {
-  return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
+float DynamicFilter::Combine(float prior_odds, float motion_log_odds) const {
+  const float odds = prior_odds * std::exp(motion_log_odds);
+  return std::min(odds / (1 + odds), static_cast<float>(1 - options_.missed_object));
 }
 
-void DynamicFilter::AddEvidence(float log_odds, size_t keypoint, Frame* frame) const {
-  float& odds = frame->motion_log_odds[keypoint];
-  odds = std::clamp(odds + log_odds, -kMaxStaticLogOdds, kMaxStaticLogOdds);
-  frame->static_probability[keypoint] = Combine(prior_[keypoint], odds);
+void DynamicFilter::JudgeByEvidence(Frame* frame) const {
+  float prior_odds = 0, log_odds = 0, p = 0;  // of the one before: in a cell most are alike
+  frame->grid.ForEachCell([&](std::span<const uint32_t> cell) {
+    for (const uint32_t i : cell) {
+      if (frame->motion_log_odds[i] == 0) continue;
+      if (frame->motion_log_odds[i] != log_odds || prior_odds_[i] != prior_odds) {
+        log_odds = frame->motion_log_odds[i];
+        prior_odds = prior_odds_[i];
+        p = Combine(prior_odds, log_odds);
+      }
+      frame->static_probability[i] = p;
+    }
+  });
 }
 
 DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
                                       const Frame& last, Frame* frame) {
   DS_TRACE("tracking/judge");
-  const bool weights = options_.method == "weights";
   last_objects_.swap(objects_);
   objects_.clear();
   boxes_.clear();
@@ -129,7 +147,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
         object.motion_log_odds = before->motion_log_odds;
         object.shifts = before->shifts;
       }
-      if (weights) object.moves = Sigmoid(std::log(p / (1 - p)) + object.motion_log_odds);
+      if (is_weighing_) object.moves = Sigmoid(std::log(p / (1 - p)) + object.motion_log_odds);
       objects_.push_back(object);
       boxes_.push_back(box.box);
     }
@@ -137,7 +155,6 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   const size_t n = frame->features.size();
   frame->static_probability.assign(n, 1.0f);
   frame->motion_log_odds.assign(n, 0.0f);
-  prior_.assign(n, 1.0f);
   if (objects_.empty()) {
     // Nothing is known that could move.
     DynamicKeypoints counts;
@@ -145,23 +162,27 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     return counts;
   }
   in_box_.assign(n, 0);
-  const float of_most = Combine(Prior(1), 0);  // most keypoints are in no box, and have not moved in any
+  if (is_weighing_ && options_.motion) {
+    for (size_t i = 0; i < n; ++i) {
+      const uint32_t from = flow.last_keypoints()[i];
+      if (from != kNotFollowed) frame->motion_log_odds[i] = last.motion_log_odds[from];
+    }
+    if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
+  }
+  prior_odds_.resize(n);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
     const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &is_inside);
     in_box_[i] = is_inside ? 1 : 0;
-    if (weights) {
-      prior_[i] = Prior(at_rest);
-      if (const uint32_t from = flow.last_keypoints()[i]; options_.motion && from != KeypointFlow::kNone) {
-        frame->motion_log_odds[i] = last.motion_log_odds[from];
-      }
-      frame->static_probability[i] = is_inside || frame->motion_log_odds[i] != 0
-                                         ? Combine(prior_[i], frame->motion_log_odds[i])
-                                         : of_most;
+    if (is_weighing_) {
+      const double prior = Prior(at_rest);
+      prior_odds_[i] = static_cast<float>(prior / (1 - prior));
+      frame->static_probability[i] = static_cast<float>(prior);
     } else if (is_inside) {
       frame->static_probability[i] = 0;
     }
   }
+  if (is_weighing_) JudgeByEvidence(frame);
   if (options_.method == "paper") JudgeByDisplacement(flow, last, frame);
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
@@ -171,8 +192,8 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   return counts;
 }
 
-float DynamicFilter::Prior(double at_rest) const {
-  return static_cast<float>(std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object));
+double DynamicFilter::Prior(double at_rest) const {
+  return std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object);
 }
 
 void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSet& features,
@@ -191,32 +212,31 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
     const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &is_inside);
     if (!is_inside) continue;
     float& p = (*static_probability)[i];
-    p = options_.method == "weights" ? std::min(p, Prior(at_rest)) : 0;
+    p = is_weighing_ ? std::min(p, static_cast<float>(Prior(at_rest))) : 0;
   }
 }
 
 double DynamicFilter::MarginOf(const Box& box) const {
-  return options_.method == "weights" ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
+  return is_weighing_ ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
 }
 
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other.
 double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
                                     bool* in_box) const {
-  const bool with_margin = options_.method == "weights";
   const double outline_px =
-      with_margin ? kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)] : 0;
+      is_weighing_ ? kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)] : 0;
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
   for (const Object& object : objects) {
-    if (!object.IsMoving()) continue;
-    if (!object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px)) continue;
-    belongs_to_none *= 1 - options_.object_share;
-    sum_moves += object.moves;
-    ++boxes;
+    const bool is_in = object.IsMoving() &
+                       object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px);
+    belongs_to_none *= is_in ? 1 - options_.object_share : 1;
+    sum_moves += is_in ? object.moves : 0;
+    boxes += is_in ? 1 : 0;
   }
   *in_box = boxes > 0;
-  return boxes == 0 ? 1 : 1 - (1 - belongs_to_none) * sum_moves / boxes;
+  return 1 - (1 - belongs_to_none) * sum_moves / std::max(1, boxes);
 }
 
 // Algorithm 2.
@@ -227,7 +247,7 @@ void DynamicFilter::JudgeByDisplacement(const KeypointFlow& flow, const Frame& l
   for (size_t i = 0; i < n; ++i) {
     const Keypoint& to = frame->features.keypoints[i];
     positions[i] = {to.raw_x, to.raw_y};
-    if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
+    if (flow.last_keypoints()[i] == kNotFollowed) continue;
     const Keypoint& from = last.features.keypoints[flow.last_keypoints()[i]];
     displacements[i] = positions[i] - Eigen::Vector2d(from.raw_x, from.raw_y);
   }
@@ -281,7 +301,7 @@ void DynamicFilter::WatchObject(const Mover& mover, const Rigid3& frame_from_las
 }
 
 void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
-  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
+  if (!is_weighing_ || !options_.motion || flow.motions().empty()) return;
   DS_TRACE("tracking/watch");
   FindMovers(flow);
   if (movers_.empty()) return;
@@ -297,10 +317,12 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
     return RestPlace{camera_.Project(far), camera_.Project(near)};
   };
   WatchKeypoints(rest, flow, last, frame);
-  if (options_.past_views) AskPastViews(nearest_depth, frame);
+  if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
+  if (options_.past_views) AskPastViews(flow, nearest_depth, frame);
+  JudgeByEvidence(frame);
 }
 
-void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
+void DynamicFilter::AskPastViews(const KeypointFlow& flow, double nearest_depth, Frame* frame) {
   for (size_t k = 0, m = 0; k < objects_.size(); ++k) {
     if (m < movers_.size() && movers_[m].object == k) {
       objects_[k].shifts.Add(movers_[m++].motion.shift_px);
@@ -311,22 +333,28 @@ void DynamicFilter::AskPastViews(double nearest_depth, Frame* frame) {
   suspects_.clear();
   for (const Object& object : objects_)
     suspects_.push_back({object.box.box, object.margin_px, &object.shifts});
-  const std::span<const float> evidence = past_views_.Judge(*frame, suspects_, nearest_depth);
+  if (flow.IsOfWitnesses()) {
+    ChooseWitnesses(*frame, in_box_, flow.last_keypoints(), &asked_);
+  } else {
+    asked_.resize(frame->features.size());
+    std::iota(asked_.begin(), asked_.end(), 0u);
+  }
+  const std::span<const float> evidence = past_views_.Judge(*frame, asked_, suspects_, nearest_depth);
   for (size_t i = 0; i < evidence.size(); ++i) {
-    if (evidence[i] != 0) AddEvidence(evidence[i], i, frame);
+    AddEvidence(evidence[i], &frame->motion_log_odds[i]);
   }
   past_views_.Add(*frame);
 }
 
 void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last, Frame* frame) {
-  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
+  if (!is_weighing_ || !options_.motion || flow.motions().empty()) return;
   DS_TRACE("tracking/watch");
   FindMovers(flow);
   if (movers_.empty()) return;
   std::vector<PointMotion> outside;
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
     const uint32_t from = flow.last_keypoints()[i];
-    if (from == KeypointFlow::kNone || frame->static_probability[i] < kMinStaticProbability ||
+    if (from == kNotFollowed || frame->static_probability[i] < kMinStaticProbability ||
         last.StaticProbability(from) < kMinStaticProbability) {
       continue;
     }
@@ -340,6 +368,7 @@ void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last,
     return RestPlace{px, px, flow_at_rest->Variance(before_px)};
   };
   WatchKeypoints(rest, flow, last, frame);
+  JudgeByEvidence(frame);
 }
 
 template <class Rest>
@@ -347,7 +376,7 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
                                    Frame* frame) const {
   const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
   for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
-    if (flow.last_keypoints()[i] == KeypointFlow::kNone) continue;
+    if (flow.last_keypoints()[i] == kNotFollowed) continue;
     const Keypoint& now = frame->features.keypoints[i];
     const auto is_around = [&](const Mover& mover) {
       return mover.to.Contains(now.raw_x, now.raw_y, mover.ring_px);
@@ -391,7 +420,7 @@ void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, c
       sum_density += density + mismatch;
     }
     const double evidence = std::log(rest_density * objects / sum_density);
-    AddEvidence(static_cast<float>(std::clamp(evidence, -kMostEvidence, kMostEvidence)), i, frame);
+    AddEvidence(std::clamp(evidence, -kMostEvidence, kMostEvidence), &frame->motion_log_odds[i]);
   }
 }
 

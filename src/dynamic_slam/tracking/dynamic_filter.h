@@ -92,32 +92,34 @@ class DynamicFilter {
   };
 
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
-  float Combine(float prior, float motion_log_odds) const;
-  // How the keypoint moved tells so much more of whether it is at rest.
-  void AddEvidence(float log_odds, size_t keypoint, Frame* frame) const;
+  float Combine(float prior_odds, float motion_log_odds) const;
+  // P(at rest) of the keypoints that are known to have moved, or not.
+  void JudgeByEvidence(Frame* frame) const;
   double MarginOf(const Box& box) const;
   double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, bool* in_box) const;
   // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
-  float Prior(double at_rest) const;
+  double Prior(double at_rest) const;
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
   template <class Rest>
   void WatchKeypoints(const Rest& rest, const KeypointFlow& flow, const Frame& last, Frame* frame) const;
-  void AskPastViews(double nearest_depth, Frame* frame);
+  void AskPastViews(const KeypointFlow& flow, double nearest_depth, Frame* frame);
   void WatchObject(const Mover& mover, const Rigid3& frame_from_last, double nearest_depth);
 
   Camera camera_;
   DynamicOptions options_;
+  bool is_weighing_;  // options_.method is "weights"
   std::vector<float> octave_scales_;
   std::vector<Object> objects_, last_objects_;
   std::vector<Box> boxes_;  // of objects_
   PastViews past_views_;
-  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
+  std::vector<float> prior_odds_;  // of being at rest, of each keypoint by the boxes alone
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
   std::vector<uint8_t> in_box_;  // of each keypoint
   std::vector<PastViews::Object> suspects_;
+  std::vector<uint32_t> asked_;  // keypoints
   BoxMotionEstimator estimator_;
   std::vector<Box> boxes_before_;
   std::vector<Eigen::Vector2d> expected_px_;

@@ -8,6 +8,7 @@
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/map/static_evidence.h"
 #include "dynamic_slam/semantics/compensation_test_scene.h"
+#include "dynamic_slam/tracking/witnesses.h"
 
 namespace dynamic_slam {
 namespace {
@@ -339,6 +340,66 @@ TEST_F(DynamicFilterTest, InTwoBoxesItBelongsToOneOfThem) {
     if (!one.box.Contains(keypoint.raw_x, keypoint.raw_y)) continue;
     EXPECT_NEAR(frame_.static_probability[i], 1 - (1 - 0.2 * 0.2) * 0.7, 1e-6);
   }
+}
+
+// A third frame, of which only witnesses among the keypoints of the second one are looked for.
+TEST_F(DynamicFilterTest, WitnessesSpeakForTheOthersAroundThem) {
+  // The person is in the upper part of the box, the wall in the lower one. Beside each keypoint three weaker
+  // ones of the same surface, in the same cell of the grid.
+  const size_t n = frame_.features.size();
+  const double wall_px = -camera_.fx * kShift / kDepth;
+  for (size_t i = 0; i < n; ++i) {
+    const Keypoint& in_last = last_.features.keypoints[i];
+    on_person_[i] = in_last.y < 300 && Person(0).box.Contains(in_last.x, in_last.y);
+    frame_.features.keypoints[i].raw_x = frame_.features.keypoints[i].x =
+        static_cast<float>(in_last.x + (on_person_[i] ? kPersonPx : wall_px));
+    for (const auto& [dx, dy] : {std::pair{2.0, 0.0}, {0.0, 2.0}, {2.0, 2.0}}) {
+      const Keypoint before = last_.features.keypoints[i], now = frame_.features.keypoints[i];
+      Add(before.x + dx, before.y + dy, now.x + dx, now.y + dy, on_person_[i]);
+    }
+    last_.features.keypoints[i].response = frame_.features.keypoints[i].response = 1;
+  }
+  for (Frame* frame : {&last_, &frame_}) {
+    frame->grid.Build(frame->features, camera_.IdealBounds());
+    frame->ClearLandmarks();
+  }
+  DynamicFilter filter = Make("weights");
+  Run(&filter);
+
+  // As far again, the person and the camera.
+  Frame third = frame_;
+  third.timestamp_s += 1.0 / 30;
+  third.cam_from_world = Rigid3(Eigen::Quaterniond::Identity(), {-2 * kShift, 0, 0});
+  for (size_t i = 0; i < third.features.size(); ++i) {
+    Keypoint& keypoint = third.features.keypoints[i];
+    keypoint.raw_x = keypoint.x += keypoint.x - last_.features.keypoints[i].x;
+  }
+  third.grid.Build(third.features, camera_.IdealBounds());
+  flow_.Match(frame_, filter.Boxes(), {}, third, KeypointFlow::Of::kWitnesses);
+  EXPECT_TRUE(flow_.IsOfWitnesses());
+  filter.Judge(std::vector{Person(2 * kPersonPx)}, flow_, frame_, &third);
+  filter.Watch(flow_, frame_, kDepth, &third);
+  int others = 0, person = 0, wall = 0, person_told = 0, wall_told = 0;
+  third.grid.ForEachCell([&](std::span<const uint32_t> cell) {
+    const auto was_followed = [&](uint32_t i) { return flow_.last_keypoints()[i] != kNotFollowed; };
+    if (std::ranges::none_of(cell, was_followed)) return;
+    for (const uint32_t i : cell) {
+      const Keypoint& keypoint = third.features.keypoints[i];
+      if (!Person(2 * kPersonPx).box.Contains(keypoint.raw_x, keypoint.raw_y, -20)) continue;
+      if (!on_person_[i] && keypoint.raw_y < 300) continue;  // a person would hide it
+      others += was_followed(i) ? 0 : 1;
+      ++(on_person_[i] ? person : wall);
+      if (on_person_[i]) {
+        person_told += third.static_probability[i] < 0.1 ? 1 : 0;
+      } else {
+        wall_told += third.static_probability[i] > kMinStaticProbability ? 1 : 0;
+      }
+    }
+  });
+  EXPECT_GT(others, (person + wall) / 2);
+  // At the border of both, a witness can be of the other.
+  EXPECT_GT(person_told, 0.9 * person);
+  EXPECT_GT(wall_told, 0.9 * wall);
 }
 
 TEST_F(DynamicFilterTest, LimbsThatSwingAreThePersonsToo) {

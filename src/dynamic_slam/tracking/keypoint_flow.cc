@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dynamic_slam/features/matcher.h"
+#include "dynamic_slam/tracking/witnesses.h"
 
 namespace dynamic_slam {
 namespace {
@@ -18,28 +19,43 @@ constexpr double kRatio = 0.8;
 }  // namespace
 
 void KeypointFlow::Clear(const Frame& frame) {
-  last_keypoints_.assign(frame.features.size(), kNone);
+  is_of_witnesses_ = false;
+  last_keypoints_.assign(frame.features.size(), kNotFollowed);
   distances_.assign(frame.features.size(), kStrictDistance + 1);
   motions_.clear();
 }
 
 void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
-                         const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame) {
+                         const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame,
+                         Of of) {
+  before_.swap(last_keypoints_);
   Clear(frame);
   if (boxes.empty()) return;
   const double interval_s = std::clamp(frame.timestamp_s - last.timestamp_s, kMinInterval_s, kMaxInterval_s);
   radius_px_ = camera_.fx * kMaxRate_rad_s * interval_s;
   const Eigen::Matrix3d rotation =
       frame_from_last.value_or(Eigen::Quaterniond::Identity()).toRotationMatrix();
-  reaches_px_.clear();
-  for (const Box& box : boxes) reaches_px_.push_back(kReach * std::sqrt(box.Area()));
-  for (uint32_t i = 0; i < last.features.size(); ++i) {
-    const Keypoint& from = last.features.keypoints[i];
-    bool is_near = false;
-    for (size_t k = 0; k < boxes.size() && !is_near; ++k) {
-      is_near = boxes[k].Contains(from.raw_x, from.raw_y, reaches_px_[k]);
+  const size_t n = last.features.size();
+  near_.assign(n, 0);
+  for (const Box& box : boxes) {
+    const double reach_px = kReach * std::sqrt(box.Area());
+    for (size_t i = 0; i < n; ++i) {
+      const Keypoint& from = last.features.keypoints[i];
+      near_[i] |= static_cast<uint8_t>(box.Contains(from.raw_x, from.raw_y, reach_px));
     }
-    if (!is_near) continue;
+  }
+  is_of_witnesses_ = of == Of::kWitnesses;
+  if (is_of_witnesses_) {
+    if (before_.size() != n) before_.clear();  // of another frame
+    ChooseWitnesses(last, near_, before_, &asked_);
+  } else {
+    asked_.clear();
+    for (uint32_t i = 0; i < n; ++i) {
+      if (near_[i] != 0) asked_.push_back(i);
+    }
+  }
+  for (const uint32_t i : asked_) {
+    const Keypoint& from = last.features.keypoints[i];
     const Eigen::Vector3d ray = rotation * camera_.Unproject({from.x, from.y});
     if (ray.z() <= 0) continue;
     const Eigen::Vector2d px = camera_.Project(ray);
@@ -53,7 +69,7 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
     last_keypoints_[match.keypoint] = i;
   }
   for (uint32_t i = 0; i < last_keypoints_.size(); ++i) {
-    if (last_keypoints_[i] == kNone) continue;
+    if (last_keypoints_[i] == kNotFollowed) continue;
     const Keypoint& from = last.features.keypoints[last_keypoints_[i]];
     const Keypoint& to = frame.features.keypoints[i];
     motions_.push_back({{from.raw_x, from.raw_y}, {to.raw_x, to.raw_y}});

@@ -17,8 +17,6 @@ namespace dynamic_slam {
 // takes them. Only in and around the given boxes: elsewhere landmarks tell more.
 class KeypointFlow {
  public:
-  static constexpr uint32_t kNone = 0xffffffffu;
-
   // How far around a box, over its mean side: an arm's length, and as much as selective tracking looks at
   // (SelectiveOptions::ring_ratio).
   static constexpr double kReach = 0.25;
@@ -30,15 +28,20 @@ class KeypointFlow {
   KeypointFlow(const Camera& camera, std::vector<float> octave_scales)
       : camera_(camera), octave_scales_(std::move(octave_scales)) {}
 
+  // Of which keypoints: all, or witnesses that speak for the others around them (ChooseWitnesses).
+  enum class Of { kAll, kWitnesses };
+
   // boxes: of objects in the last frame, px of the raw image. frame_from_last: x_in_frame = R x_in_last.
   void Match(const Frame& last, std::span<const Box> boxes,
-             const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame);
+             const std::optional<Eigen::Quaterniond>& frame_from_last, const Frame& frame, Of of = Of::kAll);
 
   // No matches.
   void Clear(const Frame& frame);
 
-  // For each keypoint of the frame the one of the last frame, or kNone.
+  // For each keypoint of the frame the one of the last frame, or kNotFollowed.
   const std::vector<uint32_t>& last_keypoints() const { return last_keypoints_; }
+
+  bool IsOfWitnesses() const { return is_of_witnesses_; }
 
   // How far keypoints were looked for.
   double radius_px() const { return radius_px_; }
@@ -50,8 +53,10 @@ class KeypointFlow {
   Camera camera_;
   std::vector<float> octave_scales_;
   double radius_px_ = 1;
-  std::vector<double> reaches_px_;  // around each box
-  std::vector<uint32_t> last_keypoints_;
+  bool is_of_witnesses_ = false;
+  std::vector<uint32_t> last_keypoints_, before_;  // before_: those of the last frame
+  std::vector<uint8_t> near_;                      // of the last frame's keypoints: 1 in or around a box
+  std::vector<uint32_t> asked_;                    // of them
   std::vector<int> distances_;
   std::vector<PointMotion> motions_;
 };

@@ -89,19 +89,19 @@ const PastViews::View* PastViews::FromBefore(const Frame& frame, double age_s) c
   return nearest;
 }
 
-std::span<const float> PastViews::Judge(const Frame& frame, std::span<const Object> objects,
-                                        double nearest_depth) {
+std::span<const float> PastViews::Judge(const Frame& frame, std::span<const uint32_t> asked,
+                                        std::span<const Object> objects, double nearest_depth) {
   objects = objects.first(std::min(objects.size(), kMaxObjects));
   evidence_.assign(frame.features.size(), 0.0f);
   ForgetUnlessNext(frame);
   const double age_s = kAges_s[frame.id.value() % std::size(kAges_s)];
-  if (const View* view = FromBefore(frame, age_s)) Ask(*view, frame, objects, nearest_depth);
+  if (const View* view = FromBefore(frame, age_s)) Ask(*view, frame, asked, objects, nearest_depth);
   ShareWithNeighbours(frame);
   return evidence_;
 }
 
-void PastViews::Ask(const View& view, const Frame& frame, std::span<const Object> objects,
-                    double nearest_depth) {
+void PastViews::Ask(const View& view, const Frame& frame, std::span<const uint32_t> asked,
+                    std::span<const Object> objects, double nearest_depth) {
   const Rigid3 view_from_frame = view.cam_from_world * frame.cam_from_world.Inverse();
   const Eigen::Matrix3d rotation = view_from_frame.Matrix();
   const size_t steps = frame.id.value() - view.id.value();
@@ -111,7 +111,7 @@ void PastViews::Ask(const View& view, const Frame& frame, std::span<const Object
   std::array<int, kMaxObjects> at_rest{}, with_object{};
   std::array<std::optional<Eigen::Vector2d>, kMaxObjects> shifts_px;
   for (size_t k = 0; k < objects.size(); ++k) shifts_px[k] = objects[k].shifts->Sum(steps);
-  for (size_t i = 0; i < n; ++i) {
+  for (const uint32_t i : asked) {
     const Keypoint& keypoint = frame.features.keypoints[i];
     const double scale = octave_scales_[static_cast<size_t>(keypoint.octave)];
     uint64_t boxes = 0;  // bits: those that it is in

@@ -54,9 +54,10 @@ class PastViews {
   void Clear() { count_ = 0; }
 
   // For each keypoint of the frame, which has a pose, the log-odds of being at rest that one of the views,
-  // the three ages in turn, and its neighbours in the image give; 0 where nothing is known. nearest_depth:
-  // nothing at rest is nearer. Valid until the next call.
-  std::span<const float> Judge(const Frame& frame, std::span<const Object> objects, double nearest_depth);
+  // the three ages in turn, and its neighbours in the image give; 0 where nothing is known. asked: those that
+  // are looked for in the view. nearest_depth: nothing at rest is nearer. Valid until the next call.
+  std::span<const float> Judge(const Frame& frame, std::span<const uint32_t> asked,
+                               std::span<const Object> objects, double nearest_depth);
 
  private:
   struct View {
@@ -73,7 +74,8 @@ class PastViews {
 
   void ForgetUnlessNext(const Frame& frame);
   const View* FromBefore(const Frame& frame, double age_s) const;
-  void Ask(const View& view, const Frame& frame, std::span<const Object> objects, double nearest_depth);
+  void Ask(const View& view, const Frame& frame, std::span<const uint32_t> asked,
+           std::span<const Object> objects, double nearest_depth);
   void ShareWithNeighbours(const Frame& frame);
 
   Camera camera_;

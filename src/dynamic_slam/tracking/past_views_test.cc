@@ -1,6 +1,7 @@
 #include "dynamic_slam/tracking/past_views.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -65,7 +66,13 @@ class PastViewsTest : public ::testing::Test {
     shifts.Add({told_step_px, 0});
     last_ = MakeFrame(kFrames - 1, person_step_px);
     const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
-    return views_.Judge(last_, objects, 0.3 * kDepth);
+    return views_.Judge(last_, All(last_), objects, 0.3 * kDepth);
+  }
+
+  static std::vector<uint32_t> All(const Frame& frame) {
+    std::vector<uint32_t> keypoints(frame.features.size());
+    std::iota(keypoints.begin(), keypoints.end(), 0u);
+    return keypoints;
   }
 
   Camera camera_ = TestCamera();
@@ -103,7 +110,7 @@ TEST_F(PastViewsTest, AskEachOfTheThreeAgesInTurn) {
     const Frame frame = MakeFrame(id, kSlowStep_px);
     if (id > 0) shifts.Add({kSlowStep_px, 0});
     const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
-    const std::span<const float> evidence = views_.Judge(frame, objects, 0.3 * kDepth);
+    const std::span<const float> evidence = views_.Judge(frame, All(frame), objects, 0.3 * kDepth);
     if (id >= kFrames) tell += std::ranges::any_of(evidence, [](float e) { return e != 0; });
     views_.Add(frame);
   }
@@ -153,7 +160,7 @@ TEST_F(PastViewsTest, ACornerThatIsNewIsAsWhatIsAroundIt) {
   last_.grid.Build(last_.features, camera_.IdealBounds());
   last_.ClearLandmarks();
   const std::vector<PastViews::Object> objects{{PersonBox(), 0, &shifts}};
-  const std::span<const float> evidence = views_.Judge(last_, objects, 0.3 * kDepth);
+  const std::span<const float> evidence = views_.Judge(last_, All(last_), objects, 0.3 * kDepth);
   for (size_t i = 0; i < n; ++i) {
     if (!InBox(places_[i], 20)) continue;
     if (on_person_[i]) {

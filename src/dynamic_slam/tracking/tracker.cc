@@ -67,7 +67,9 @@ void Tracker::Extract(FrameId id, double timestamp_s, const cv::Mat& grey, const
   frame_.reference = last_.reference;
   frame_.reference_unit = 1;
   DS_TRACE("tracking/flow");
-  flow_.Match(last_, filter_.Boxes(), motion ? std::optional(motion->rotation) : std::nullopt, frame_);
+  // A start needs all that moves as what is at rest does.
+  flow_.Match(last_, filter_.Boxes(), motion ? std::optional(motion->rotation) : std::nullopt, frame_,
+              last_has_pose_ ? KeypointFlow::Of::kWitnesses : KeypointFlow::Of::kAll);
 }
 
 // Where people fill the view, their clothes have more and stronger corners than the ceiling and the floor,
