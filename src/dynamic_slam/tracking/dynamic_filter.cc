@@ -169,10 +169,11 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     }
     if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   }
+  FindReaches(objects_, &reaches_);
   prior_odds_.resize(n);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
-    const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &is_inside);
+    const double at_rest = AtRestByBoxes(reaches_, frame->features.keypoints[i], &is_inside);
     in_box_[i] = is_inside ? 1 : 0;
     if (is_weighing_) {
       const double prior = Prior(at_rest);
@@ -206,10 +207,12 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
         {.box = box, .margin_px = MarginOf(box.box), .moves = std::min(box.probability, kMostProbability)});
   }
   if (objects.empty()) return;
+  std::vector<Reach> reaches;
+  FindReaches(objects, &reaches);
   static_probability->resize(features.size(), 1.0f);
   for (size_t i = 0; i < features.size(); ++i) {
     bool is_inside = false;
-    const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &is_inside);
+    const double at_rest = AtRestByBoxes(reaches, features.keypoints[i], &is_inside);
     if (!is_inside) continue;
     float& p = (*static_probability)[i];
     p = is_weighing_ ? std::min(p, static_cast<float>(Prior(at_rest))) : 0;
@@ -220,19 +223,34 @@ double DynamicFilter::MarginOf(const Box& box) const {
   return is_weighing_ ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
 }
 
+void DynamicFilter::FindReaches(std::span<const Object> objects, std::vector<Reach>* reaches) const {
+  reaches->clear();
+  for (const float scale : octave_scales_) {
+    const double outline_px = is_weighing_ ? kCornerRadius * scale : 0;
+    for (const Object& object : objects) {
+      if (!object.IsMoving()) continue;
+      const Box& box = object.box.box;
+      const double margin_px = object.margin_px + outline_px;
+      reaches->push_back({box.x - margin_px, box.y - margin_px, box.x + box.width + margin_px,
+                          box.y + box.height + margin_px, object.moves});
+    }
+  }
+}
+
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
-// of these objects, each as likely as the other.
-double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
+// of these objects, each as likely as the other. Without branches: where keypoints are is hard to predict.
+double DynamicFilter::AtRestByBoxes(std::span<const Reach> reaches, const Keypoint& keypoint,
                                     bool* in_box) const {
-  const double outline_px =
-      is_weighing_ ? kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)] : 0;
+  const size_t objects = reaches.size() / octave_scales_.size();
+  const std::span<const Reach> of_octave =
+      reaches.subspan(static_cast<size_t>(keypoint.octave) * objects, objects);
+  const double x = keypoint.raw_x, y = keypoint.raw_y;
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
-  for (const Object& object : objects) {
-    const bool is_in = object.IsMoving() &
-                       object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px);
+  for (const Reach& reach : of_octave) {
+    const bool is_in = (x >= reach.left) & (y >= reach.top) & (x < reach.right) & (y < reach.bottom);
     belongs_to_none *= is_in ? 1 - options_.object_share : 1;
-    sum_moves += is_in ? object.moves : 0;
+    sum_moves += is_in ? reach.moves : 0;
     boxes += is_in ? 1 : 0;
   }
   *in_box = boxes > 0;

@@ -77,6 +77,12 @@ class DynamicFilter {
     bool IsMoving() const { return moves >= 0.5; }
   };
 
+  // Within which a keypoint is in an object's box, raw px.
+  struct Reach {
+    double left, top, right, bottom;
+    double moves;  // P(moves) of the object
+  };
+
   // An object that is in the last frame too, and how it moved in the image.
   struct Mover {
     size_t object;  // in objects_
@@ -96,7 +102,9 @@ class DynamicFilter {
   // P(at rest) of the keypoints that are known to have moved, or not.
   void JudgeByEvidence(Frame* frame) const;
   double MarginOf(const Box& box) const;
-  double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, bool* in_box) const;
+  // Within which keypoints of each octave, one after the other, are in the boxes of objects that move.
+  void FindReaches(std::span<const Object> objects, std::vector<Reach>* reaches) const;
+  double AtRestByBoxes(std::span<const Reach> reaches, const Keypoint& keypoint, bool* in_box) const;
   // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
   double Prior(double at_rest) const;
   void FindMovers(const KeypointFlow& flow);
@@ -117,6 +125,7 @@ class DynamicFilter {
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
+  std::vector<Reach> reaches_;
   std::vector<uint8_t> in_box_;  // of each keypoint
   std::vector<PastViews::Object> suspects_;
   std::vector<uint32_t> asked_;  // keypoints
