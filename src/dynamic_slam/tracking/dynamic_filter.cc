@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -65,7 +64,6 @@ DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options
                              std::vector<float> octave_scales)
     : camera_(camera),
       options_(options),
-      is_weighing_(options.method == "weights"),
       octave_scales_(std::move(octave_scales)),
       past_views_(camera, octave_scales_) {}
 
@@ -109,20 +107,19 @@ bool DynamicFilter::OnlyBoxesMove(std::span<const PointMotion> motions) const {
   return *upper > kMoves_px;
 }
 
-float DynamicFilter::Combine(float prior_odds, float motion_log_odds) const {
-  const float odds = prior_odds * std::exp(motion_log_odds);
-  return std::min(odds / (1 + odds), static_cast<float>(1 - options_.missed_object));
+float DynamicFilter::Combine(float prior, float motion_log_odds) const {
+  return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
 }
 
 void DynamicFilter::JudgeByEvidence(Frame* frame) const {
-  float prior_odds = 0, log_odds = 0, p = 0;  // of the one before: in a cell most are alike
+  float prior = 0, log_odds = 0, p = 0;  // of the one before: in a cell most are alike
   frame->grid.ForEachCell([&](std::span<const uint32_t> cell) {
     for (const uint32_t i : cell) {
       if (frame->motion_log_odds[i] == 0) continue;
-      if (frame->motion_log_odds[i] != log_odds || prior_odds_[i] != prior_odds) {
+      if (frame->motion_log_odds[i] != log_odds || prior_[i] != prior) {
         log_odds = frame->motion_log_odds[i];
-        prior_odds = prior_odds_[i];
-        p = Combine(prior_odds, log_odds);
+        prior = prior_[i];
+        p = Combine(prior, log_odds);
       }
       frame->static_probability[i] = p;
     }
@@ -132,6 +129,7 @@ void DynamicFilter::JudgeByEvidence(Frame* frame) const {
 DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
                                       const Frame& last, Frame* frame) {
   DS_TRACE("tracking/judge");
+  const bool weights = options_.method == "weights";
   last_objects_.swap(objects_);
   objects_.clear();
   boxes_.clear();
@@ -147,7 +145,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
         object.motion_log_odds = before->motion_log_odds;
         object.shifts = before->shifts;
       }
-      if (is_weighing_) object.moves = Sigmoid(std::log(p / (1 - p)) + object.motion_log_odds);
+      if (weights) object.moves = Sigmoid(std::log(p / (1 - p)) + object.motion_log_odds);
       objects_.push_back(object);
       boxes_.push_back(box.box);
     }
@@ -162,7 +160,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     return counts;
   }
   in_box_.assign(n, 0);
-  if (is_weighing_ && options_.motion) {
+  if (weights && options_.motion) {
     for (size_t i = 0; i < n; ++i) {
       const uint32_t from = flow.last_keypoints()[i];
       if (from != kNotFollowed) frame->motion_log_odds[i] = last.motion_log_odds[from];
@@ -170,20 +168,18 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   }
   FindReaches(objects_, &reaches_);
-  prior_odds_.resize(n);
+  prior_.resize(n);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
     const double at_rest = AtRestByBoxes(reaches_, frame->features.keypoints[i], &is_inside);
     in_box_[i] = is_inside ? 1 : 0;
-    if (is_weighing_) {
-      const double prior = Prior(at_rest);
-      prior_odds_[i] = static_cast<float>(prior / (1 - prior));
-      frame->static_probability[i] = static_cast<float>(prior);
+    if (weights) {
+      prior_[i] = frame->static_probability[i] = Prior(at_rest);
     } else if (is_inside) {
       frame->static_probability[i] = 0;
     }
   }
-  if (is_weighing_) JudgeByEvidence(frame);
+  if (weights) JudgeByEvidence(frame);
   if (options_.method == "paper") JudgeByDisplacement(flow, last, frame);
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
@@ -193,8 +189,8 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   return counts;
 }
 
-double DynamicFilter::Prior(double at_rest) const {
-  return std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object);
+float DynamicFilter::Prior(double at_rest) const {
+  return static_cast<float>(std::clamp(at_rest, options_.missed_object, 1 - options_.missed_object));
 }
 
 void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSet& features,
@@ -215,18 +211,18 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
     const double at_rest = AtRestByBoxes(reaches, features.keypoints[i], &is_inside);
     if (!is_inside) continue;
     float& p = (*static_probability)[i];
-    p = is_weighing_ ? std::min(p, static_cast<float>(Prior(at_rest))) : 0;
+    p = options_.method == "weights" ? std::min(p, Prior(at_rest)) : 0;
   }
 }
 
 double DynamicFilter::MarginOf(const Box& box) const {
-  return is_weighing_ ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
+  return options_.method == "weights" ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
 }
 
 void DynamicFilter::FindReaches(std::span<const Object> objects, std::vector<Reach>* reaches) const {
   reaches->clear();
   for (const float scale : octave_scales_) {
-    const double outline_px = is_weighing_ ? kCornerRadius * scale : 0;
+    const double outline_px = options_.method == "weights" ? kCornerRadius * scale : 0;
     for (const Object& object : objects) {
       if (!object.IsMoving()) continue;
       const Box& box = object.box.box;
@@ -319,7 +315,7 @@ void DynamicFilter::WatchObject(const Mover& mover, const Rigid3& frame_from_las
 }
 
 void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double median_depth, Frame* frame) {
-  if (!is_weighing_ || !options_.motion || flow.motions().empty()) return;
+  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
   DS_TRACE("tracking/watch");
   FindMovers(flow);
   if (movers_.empty()) return;
@@ -335,7 +331,7 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
     return RestPlace{camera_.Project(far), camera_.Project(near)};
   };
   WatchKeypoints(rest, flow, last, frame);
-  if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
+  ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   if (options_.past_views) AskPastViews(flow, nearest_depth, frame);
   JudgeByEvidence(frame);
 }
@@ -351,12 +347,7 @@ void DynamicFilter::AskPastViews(const KeypointFlow& flow, double nearest_depth,
   suspects_.clear();
   for (const Object& object : objects_)
     suspects_.push_back({object.box.box, object.margin_px, &object.shifts});
-  if (flow.IsOfWitnesses()) {
-    ChooseWitnesses(*frame, in_box_, flow.last_keypoints(), &asked_);
-  } else {
-    asked_.resize(frame->features.size());
-    std::iota(asked_.begin(), asked_.end(), 0u);
-  }
+  ChooseWitnesses(*frame, in_box_, flow.last_keypoints(), &asked_);
   const std::span<const float> evidence = past_views_.Judge(*frame, asked_, suspects_, nearest_depth);
   for (size_t i = 0; i < evidence.size(); ++i) {
     AddEvidence(evidence[i], &frame->motion_log_odds[i]);
@@ -365,7 +356,7 @@ void DynamicFilter::AskPastViews(const KeypointFlow& flow, double nearest_depth,
 }
 
 void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last, Frame* frame) {
-  if (!is_weighing_ || !options_.motion || flow.motions().empty()) return;
+  if (options_.method != "weights" || !options_.motion || flow.motions().empty()) return;
   DS_TRACE("tracking/watch");
   FindMovers(flow);
   if (movers_.empty()) return;

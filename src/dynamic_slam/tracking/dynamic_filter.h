@@ -98,7 +98,7 @@ class DynamicFilter {
   };
 
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
-  float Combine(float prior_odds, float motion_log_odds) const;
+  float Combine(float prior, float motion_log_odds) const;
   // P(at rest) of the keypoints that are known to have moved, or not.
   void JudgeByEvidence(Frame* frame) const;
   double MarginOf(const Box& box) const;
@@ -106,7 +106,7 @@ class DynamicFilter {
   void FindReaches(std::span<const Object> objects, std::vector<Reach>* reaches) const;
   double AtRestByBoxes(std::span<const Reach> reaches, const Keypoint& keypoint, bool* in_box) const;
   // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
-  double Prior(double at_rest) const;
+  float Prior(double at_rest) const;
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
   template <class Rest>
@@ -116,12 +116,11 @@ class DynamicFilter {
 
   Camera camera_;
   DynamicOptions options_;
-  bool is_weighing_;  // options_.method is "weights"
   std::vector<float> octave_scales_;
   std::vector<Object> objects_, last_objects_;
   std::vector<Box> boxes_;  // of objects_
   PastViews past_views_;
-  std::vector<float> prior_odds_;  // of being at rest, of each keypoint by the boxes alone
+  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
