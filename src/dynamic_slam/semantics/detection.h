@@ -15,10 +15,10 @@ struct Box {
   double Area() const { return std::max(width, 0.0) * std::max(height, 0.0); }
   double CenterX() const { return x + 0.5 * width; }
   double CenterY() const { return y + 0.5 * height; }
-  // Of a point at most margin_px outside as well.
+  // Of a point at most margin_px outside as well. Without branches: where points are is hard to predict.
   bool Contains(double px, double py, double margin_px = 0) const {
-    return px >= x - margin_px && py >= y - margin_px && px < x + width + margin_px &&
-           py < y + height + margin_px;
+    return (px >= x - margin_px) & (py >= y - margin_px) & (px < x + width + margin_px) &
+           (py < y + height + margin_px);
   }
 };
 

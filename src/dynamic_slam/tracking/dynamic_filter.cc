@@ -111,11 +111,10 @@ float DynamicFilter::Combine(float prior, float motion_log_odds) const {
   return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
 }
 
-void DynamicFilter::JudgeByEvidence(Frame* frame) const {
-  float prior = 0, log_odds = 0, p = 0;  // of the one before: in a cell most are alike
+void DynamicFilter::CombineAll(Frame* frame) const {
+  float prior = -1, log_odds = 0, p = 0;  // of the one before: in a cell most are alike
   frame->grid.ForEachCell([&](std::span<const uint32_t> cell) {
     for (const uint32_t i : cell) {
-      if (frame->motion_log_odds[i] == 0) continue;
       if (frame->motion_log_odds[i] != log_odds || prior_[i] != prior) {
         log_odds = frame->motion_log_odds[i];
         prior = prior_[i];
@@ -167,19 +166,18 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     }
     if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   }
-  FindReaches(objects_, &reaches_);
   prior_.resize(n);
   for (size_t i = 0; i < n; ++i) {
     bool is_inside = false;
-    const double at_rest = AtRestByBoxes(reaches_, frame->features.keypoints[i], &is_inside);
+    const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &is_inside);
     in_box_[i] = is_inside ? 1 : 0;
     if (weights) {
-      prior_[i] = frame->static_probability[i] = Prior(at_rest);
+      prior_[i] = Prior(at_rest);
     } else if (is_inside) {
       frame->static_probability[i] = 0;
     }
   }
-  if (weights) JudgeByEvidence(frame);
+  if (weights) CombineAll(frame);
   if (options_.method == "paper") JudgeByDisplacement(flow, last, frame);
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
@@ -203,12 +201,10 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
         {.box = box, .margin_px = MarginOf(box.box), .moves = std::min(box.probability, kMostProbability)});
   }
   if (objects.empty()) return;
-  std::vector<Reach> reaches;
-  FindReaches(objects, &reaches);
   static_probability->resize(features.size(), 1.0f);
   for (size_t i = 0; i < features.size(); ++i) {
     bool is_inside = false;
-    const double at_rest = AtRestByBoxes(reaches, features.keypoints[i], &is_inside);
+    const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &is_inside);
     if (!is_inside) continue;
     float& p = (*static_probability)[i];
     p = options_.method == "weights" ? std::min(p, Prior(at_rest)) : 0;
@@ -219,38 +215,24 @@ double DynamicFilter::MarginOf(const Box& box) const {
   return options_.method == "weights" ? options_.margin_ratio * std::sqrt(box.Area()) : 0;
 }
 
-void DynamicFilter::FindReaches(std::span<const Object> objects, std::vector<Reach>* reaches) const {
-  reaches->clear();
-  for (const float scale : octave_scales_) {
-    const double outline_px = options_.method == "weights" ? kCornerRadius * scale : 0;
-    for (const Object& object : objects) {
-      if (!object.IsMoving()) continue;
-      const Box& box = object.box.box;
-      const double margin_px = object.margin_px + outline_px;
-      reaches->push_back({box.x - margin_px, box.y - margin_px, box.x + box.width + margin_px,
-                          box.y + box.height + margin_px, object.moves});
-    }
-  }
-}
-
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
-// of these objects, each as likely as the other. Without branches: where keypoints are is hard to predict.
-double DynamicFilter::AtRestByBoxes(std::span<const Reach> reaches, const Keypoint& keypoint,
+// of these objects, each as likely as the other.
+double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
                                     bool* in_box) const {
-  const size_t objects = reaches.size() / octave_scales_.size();
-  const std::span<const Reach> of_octave =
-      reaches.subspan(static_cast<size_t>(keypoint.octave) * objects, objects);
-  const double x = keypoint.raw_x, y = keypoint.raw_y;
+  const bool with_margin = options_.method == "weights";
+  const double outline_px =
+      with_margin ? kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)] : 0;
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
-  for (const Reach& reach : of_octave) {
-    const bool is_in = (x >= reach.left) & (y >= reach.top) & (x < reach.right) & (y < reach.bottom);
-    belongs_to_none *= is_in ? 1 - options_.object_share : 1;
-    sum_moves += is_in ? reach.moves : 0;
-    boxes += is_in ? 1 : 0;
+  for (const Object& object : objects) {
+    if (!object.IsMoving()) continue;
+    if (!object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px)) continue;
+    belongs_to_none *= 1 - options_.object_share;
+    sum_moves += object.moves;
+    ++boxes;
   }
   *in_box = boxes > 0;
-  return 1 - (1 - belongs_to_none) * sum_moves / std::max(1, boxes);
+  return boxes == 0 ? 1 : 1 - (1 - belongs_to_none) * sum_moves / boxes;
 }
 
 // Algorithm 2.
@@ -333,7 +315,7 @@ void DynamicFilter::Watch(const KeypointFlow& flow, const Frame& last, double me
   WatchKeypoints(rest, flow, last, frame);
   ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   if (options_.past_views) AskPastViews(flow, nearest_depth, frame);
-  JudgeByEvidence(frame);
+  CombineAll(frame);
 }
 
 void DynamicFilter::AskPastViews(const KeypointFlow& flow, double nearest_depth, Frame* frame) {
@@ -377,7 +359,7 @@ void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last,
     return RestPlace{px, px, flow_at_rest->Variance(before_px)};
   };
   WatchKeypoints(rest, flow, last, frame);
-  JudgeByEvidence(frame);
+  CombineAll(frame);
 }
 
 template <class Rest>

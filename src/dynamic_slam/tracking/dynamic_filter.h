@@ -77,12 +77,6 @@ class DynamicFilter {
     bool IsMoving() const { return moves >= 0.5; }
   };
 
-  // Within which a keypoint is in an object's box, raw px.
-  struct Reach {
-    double left, top, right, bottom;
-    double moves;  // P(moves) of the object
-  };
-
   // An object that is in the last frame too, and how it moved in the image.
   struct Mover {
     size_t object;  // in objects_
@@ -99,12 +93,10 @@ class DynamicFilter {
 
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
-  // P(at rest) of the keypoints that are known to have moved, or not.
-  void JudgeByEvidence(Frame* frame) const;
+  // P(at rest) of each keypoint, by the boxes and by how it moved.
+  void CombineAll(Frame* frame) const;
   double MarginOf(const Box& box) const;
-  // Within which keypoints of each octave, one after the other, are in the boxes of objects that move.
-  void FindReaches(std::span<const Object> objects, std::vector<Reach>* reaches) const;
-  double AtRestByBoxes(std::span<const Reach> reaches, const Keypoint& keypoint, bool* in_box) const;
+  double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, bool* in_box) const;
   // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
   float Prior(double at_rest) const;
   void FindMovers(const KeypointFlow& flow);
@@ -124,7 +116,6 @@ class DynamicFilter {
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
-  std::vector<Reach> reaches_;
   std::vector<uint8_t> in_box_;  // of each keypoint
   std::vector<PastViews::Object> suspects_;
   std::vector<uint32_t> asked_;  // keypoints

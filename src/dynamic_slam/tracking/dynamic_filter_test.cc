@@ -402,6 +402,34 @@ TEST_F(DynamicFilterTest, WitnessesSpeakForTheOthersAroundThem) {
   EXPECT_GT(wall_told, 0.9 * wall);
 }
 
+TEST_F(DynamicFilterTest, EvidenceThatIsOutweighedLeavesTheBox) {
+  DynamicFilter filter = Make("weights");
+  Run(&filter);
+  // What was seen to move as the person did, as surely as it now looks at rest, is as likely either as its
+  // box says.
+  Frame before = last_;
+  before.motion_log_odds.resize(before.features.size());
+  for (size_t i = 0; i < before.features.size(); ++i) before.motion_log_odds[i] = -frame_.motion_log_odds[i];
+  DynamicOptions options;
+  options.past_views = false;
+  DynamicFilter other(camera_, options, OctaveScales());
+  flow_.Clear(last_);
+  other.Judge(std::vector{Person(0)}, flow_, frame_, &last_);
+  last_.motion_log_odds = before.motion_log_odds;
+  flow_.Match(last_, other.Boxes(), {}, frame_);
+  other.Judge(std::vector{Person(kPersonPx)}, flow_, last_, &frame_);
+  const std::vector<float> early = frame_.static_probability;
+  other.Watch(flow_, last_, kDepth, &frame_);
+  int outweighed = 0;
+  for (size_t i = 0; i < on_person_.size(); ++i) {
+    if (!IsInBox(i) || frame_.motion_log_odds[i] != 0 || before.motion_log_odds[i] == 0) continue;
+    ++outweighed;
+    EXPECT_NEAR(frame_.static_probability[i], 1 - 0.8 * 0.95, 1e-5);
+    EXPECT_NE(frame_.static_probability[i], early[i]);
+  }
+  EXPECT_GT(outweighed, 10);
+}
+
 TEST_F(DynamicFilterTest, LimbsThatSwingAreThePersonsToo) {
   for (size_t i = 0; i < on_person_.size(); ++i) {
     Keypoint& keypoint = frame_.features.keypoints[i];
