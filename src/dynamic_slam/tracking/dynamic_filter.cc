@@ -65,7 +65,10 @@ DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options
     : camera_(camera),
       options_(options),
       octave_scales_(std::move(octave_scales)),
-      past_views_(camera, octave_scales_) {}
+      past_views_(camera, octave_scales_) {
+  const double radius_px = options.method == "weights" ? kCornerRadius : 0;
+  for (const float scale : octave_scales_) outlines_px_.push_back(radius_px * scale);
+}
 
 float DynamicFilter::Evidence(float static_probability, bool fits) const {
   if (!options_.landmark_odds || static_probability <= 0) return 0;
@@ -216,23 +219,22 @@ double DynamicFilter::MarginOf(const Box& box) const {
 }
 
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
-// of these objects, each as likely as the other.
+// of these objects, each as likely as the other. Without branches: where keypoints are is hard to predict.
 double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
                                     bool* in_box) const {
-  const bool with_margin = options_.method == "weights";
-  const double outline_px =
-      with_margin ? kCornerRadius * octave_scales_[static_cast<size_t>(keypoint.octave)] : 0;
+  const double outline_px = outlines_px_[static_cast<size_t>(keypoint.octave)];
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
   for (const Object& object : objects) {
-    if (!object.IsMoving()) continue;
-    if (!object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px)) continue;
-    belongs_to_none *= 1 - options_.object_share;
-    sum_moves += object.moves;
-    ++boxes;
+    const bool is_inside =
+        object.IsMoving() &
+        object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px);
+    belongs_to_none *= is_inside ? 1 - options_.object_share : 1;
+    sum_moves += is_inside ? object.moves : 0;
+    boxes += is_inside ? 1 : 0;
   }
   *in_box = boxes > 0;
-  return boxes == 0 ? 1 : 1 - (1 - belongs_to_none) * sum_moves / boxes;
+  return 1 - (1 - belongs_to_none) * sum_moves / std::max(1, boxes);
 }
 
 // Algorithm 2.

@@ -109,6 +109,7 @@ class DynamicFilter {
   Camera camera_;
   DynamicOptions options_;
   std::vector<float> octave_scales_;
+  std::vector<double> outlines_px_;  // of each octave: how far a corner at an outline reaches beyond it
   std::vector<Object> objects_, last_objects_;
   std::vector<Box> boxes_;  // of objects_
   PastViews past_views_;

@@ -92,7 +92,7 @@ struct TrackerOptions {
   int min_relocalisation_inliers = 50;
   int local_keyframes = 60;
   int relocalisation_keyframes = 20;
-  int restart_after_frames = 15;
+  int restart_after_frames = 2;
   int small_map_keyframes = 5;
   double seeds_min_share = 1;
   bool localise_only = false;

@@ -1,30 +1,33 @@
 #include "dynamic_slam/tracking/witnesses.h"
 
-#include <utility>
+#include <algorithm>
 
 namespace dynamic_slam {
 
+// Without branches for single keypoints, as which of them are candidates, known or followed is hard to
+// predict.
 void ChooseWitnesses(const Frame& frame, std::span<const uint8_t> candidates,
                      std::span<const uint32_t> last_keypoints, std::vector<uint32_t>* witnesses) {
-  witnesses->clear();
-  const auto worth = [&](uint32_t i) {
-    const bool was_followed = !last_keypoints.empty() && last_keypoints[i] != kNotFollowed;
-    return std::pair(was_followed, frame.features.keypoints[i].response);
-  };
+  constexpr float kFollowed = 256;  // more than any FAST score
+  witnesses->resize(frame.features.size());
+  size_t count = 0;
   frame.grid.ForEachCell([&](std::span<const uint32_t> cell) {
-    constexpr uint32_t kNone = 0xffffffffu;
-    const size_t before = witnesses->size();
-    uint32_t best = kNone;
+    const size_t before = count;
+    uint32_t best = 0;
+    float most = -1;
     for (const uint32_t i : cell) {
-      if (candidates[i] == 0) continue;
-      if (frame.landmarks[i].IsValid()) {
-        witnesses->push_back(i);
-      } else if (best == kNone || worth(i) > worth(best)) {
-        best = i;
-      }
+      const bool is_known = frame.landmarks[i].IsValid();
+      const bool was_followed = !last_keypoints.empty() && last_keypoints[i] != kNotFollowed;
+      const float worth = frame.features.keypoints[i].response + (was_followed ? kFollowed : 0);
+      const bool is_better = (candidates[i] != 0) & (worth > most);
+      best = is_better ? i : best;
+      most = is_better ? worth : most;
+      (*witnesses)[count] = i;
+      count += static_cast<size_t>((candidates[i] != 0) & is_known);
     }
-    if (witnesses->size() == before && best != kNone) witnesses->push_back(best);
+    if (count == before && most >= 0) (*witnesses)[count++] = best;
   });
+  witnesses->resize(count);
 }
 
 void ShareInCells(const KeypointGrid& grid, std::span<const uint32_t> last_keypoints,
@@ -33,15 +36,13 @@ void ShareInCells(const KeypointGrid& grid, std::span<const uint32_t> last_keypo
     float sum = 0;
     int followed = 0;
     for (const uint32_t i : cell) {
-      if (last_keypoints[i] == kNotFollowed) continue;
-      sum += log_odds[i];
-      ++followed;
+      const bool is_followed = last_keypoints[i] != kNotFollowed;
+      sum += is_followed ? log_odds[i] : 0;
+      followed += is_followed ? 1 : 0;
     }
     if (sum == 0) return;
     const float mean = sum / static_cast<float>(followed);
-    for (const uint32_t i : cell) {
-      if (last_keypoints[i] == kNotFollowed) log_odds[i] = mean;
-    }
+    for (const uint32_t i : cell) log_odds[i] = last_keypoints[i] != kNotFollowed ? log_odds[i] : mean;
   });
 }
 
