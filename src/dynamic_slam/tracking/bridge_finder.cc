@@ -17,8 +17,9 @@ namespace {
 // no two share more than what is there by chance, as loops have it (LoopOptions::covisible_weight).
 constexpr int kNeighbours = 10, kByChance = 15;
 
-// Keyframes on either side of a border that are looked for from the other.
-constexpr size_t kKeyframes = 4;
+// Keyframes on either side of a border that are looked for from the other. Those beside it are from the turn
+// in which the camera was lost, and show the least.
+constexpr size_t kKeyframes = 12;
 
 // Landmarks by which the scale is known: with each as well as below, to 8%.
 constexpr int kMinCommon = 10;
