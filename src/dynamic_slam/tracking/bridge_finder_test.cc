@@ -122,6 +122,28 @@ TEST_F(BridgeFinderTest, AFewCommonLandmarksAreEnough) {
   EXPECT_NEAR(SecondFromFirst(bridge).scale, kDrift.scale, 0.04);
 }
 
+TEST_F(BridgeFinderTest, WhatABlurredTurnShowsNotIsFoundBeyondIt) {
+  for (const int side : {0, 1}) {
+    const PartId part = scene_.map.BeginPart();
+    for (int i = 0; i < kKeyframes; ++i) {
+      const bool is_clear = side == 0 ? i < 2 : i >= 4;
+      const SyntheticWorld as_it_looks = world_;
+      if (!is_clear) world_.Repaint(0);
+      keyframes_[side].push_back(scene_.Add(SidewaysPose(0.1 * (kKeyframes * side + i)), part));
+      if (is_clear) continue;
+      world_ = as_it_looks;
+      LoseFrames(1);  // time goes on
+    }
+    const std::vector<KeyframeId>& all = keyframes_[side];
+    scene_.AddLandmarks(0, kPoints / 2, all);
+    scene_.AddLandmarks(kPoints / 2, kPoints, {side == 0 ? all[1] : all[4], side == 0 ? all[0] : all[5]});
+  }
+  scene_.Drift(keyframes_[1], kDrift);
+  const Bridge bridge = Find();
+  ASSERT_THAT(bridge.reason, IsEmpty());
+  ExpectKDrift(bridge);
+}
+
 TEST_F(BridgeFinderTest, AnotherPlaceIsNoBridge) {
   MakeParts(0);
   EXPECT_THAT(Find().reason, HasSubstr("0 landmarks are on both sides"));
