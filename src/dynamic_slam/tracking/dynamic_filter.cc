@@ -142,7 +142,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
       const auto before = std::find_if(last_objects_.begin(), last_objects_.end(), [&](const Object& object) {
         return object.box.track_id == box.track_id;
       });
-      Object object{.box = box, .margin_px = MarginOf(box.box)};
+      Object object{.box = box, .margin_px = MarginOf(box.box), .witnesses = WitnessesOf(box.box)};
       if (before != last_objects_.end()) {
         object.motion_log_odds = before->motion_log_odds;
         object.shifts = before->shifts;
@@ -171,12 +171,10 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   }
   prior_.resize(n);
   for (size_t i = 0; i < n; ++i) {
-    bool is_inside = false;
-    const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &is_inside);
-    in_box_[i] = is_inside ? 1 : 0;
+    const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &in_box_[i]);
     if (weights) {
       prior_[i] = Prior(at_rest);
-    } else if (is_inside) {
+    } else if (in_box_[i] != 0) {
       frame->static_probability[i] = 0;
     }
   }
@@ -200,15 +198,17 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
   std::vector<Object> objects;
   for (const DynamicBox& box : boxes) {
     if (!box.is_dynamic) continue;
-    objects.push_back(
-        {.box = box, .margin_px = MarginOf(box.box), .moves = std::min(box.probability, kMostProbability)});
+    objects.push_back({.box = box,
+                       .margin_px = MarginOf(box.box),
+                       .witnesses = WitnessesOf(box.box),
+                       .moves = std::min(box.probability, kMostProbability)});
   }
   if (objects.empty()) return;
   static_probability->resize(features.size(), 1.0f);
   for (size_t i = 0; i < features.size(); ++i) {
-    bool is_inside = false;
-    const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &is_inside);
-    if (!is_inside) continue;
+    uint8_t in_boxes = 0;
+    const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &in_boxes);
+    if (in_boxes == 0) continue;
     float& p = (*static_probability)[i];
     p = options_.method == "weights" ? std::min(p, Prior(at_rest)) : 0;
   }
@@ -221,19 +221,19 @@ double DynamicFilter::MarginOf(const Box& box) const {
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other. Without branches: where keypoints are is hard to predict.
 double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
-                                    bool* in_box) const {
+                                    uint8_t* in_boxes) const {
   const double outline_px = outlines_px_[static_cast<size_t>(keypoint.octave)];
   double belongs_to_none = 1, sum_moves = 0;
   int boxes = 0;
+  *in_boxes = 0;
   for (const Object& object : objects) {
-    const bool is_inside =
-        object.IsMoving() &
-        object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, object.margin_px + outline_px);
+    const bool is_inside = object.IsMoving() & object.box.box.Contains(keypoint.raw_x, keypoint.raw_y,
+                                                                       object.margin_px + outline_px);
     belongs_to_none *= is_inside ? 1 - options_.object_share : 1;
     sum_moves += is_inside ? object.moves : 0;
     boxes += is_inside ? 1 : 0;
+    *in_boxes |= static_cast<uint8_t>(is_inside * object.witnesses);
   }
-  *in_box = boxes > 0;
   return 1 - (1 - belongs_to_none) * sum_moves / std::max(1, boxes);
 }
 

@@ -70,6 +70,7 @@ class DynamicFilter {
   struct Object {
     DynamicBox box;
     double margin_px = 0;        // by which it may reach out of its box
+    uint8_t witnesses = 0;       // WitnessesOf its box
     double moves = 1;            // P(moves) by its class and its motion so far
     double motion_log_odds = 0;  // of moving: what its motion tells beside the class
     ShiftHistory shifts = {};    // while the pose was known
@@ -96,7 +97,7 @@ class DynamicFilter {
   // P(at rest) of each keypoint, by the boxes and by how it moved.
   void CombineAll(Frame* frame) const;
   double MarginOf(const Box& box) const;
-  double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, bool* in_box) const;
+  double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, uint8_t* in_boxes) const;
   // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
   float Prior(double at_rest) const;
   void FindMovers(const KeypointFlow& flow);
@@ -117,7 +118,7 @@ class DynamicFilter {
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
-  std::vector<uint8_t> in_box_;  // of each keypoint
+  std::vector<uint8_t> in_box_;  // of each keypoint: WitnessesOf the boxes that it is in
   std::vector<PastViews::Object> suspects_;
   std::vector<uint32_t> asked_;  // keypoints
   BoxMotionEstimator estimator_;

@@ -39,9 +39,10 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
   near_.assign(n, 0);
   for (const Box& box : boxes) {
     const double reach_px = kReach * std::sqrt(box.Area());
+    const uint8_t witnesses = WitnessesOf(box);
     for (size_t i = 0; i < n; ++i) {
       const Keypoint& from = last.features.keypoints[i];
-      near_[i] |= static_cast<uint8_t>(box.Contains(from.raw_x, from.raw_y, reach_px));
+      near_[i] |= static_cast<uint8_t>(box.Contains(from.raw_x, from.raw_y, reach_px) * witnesses);
     }
   }
   is_of_witnesses_ = of == Of::kWitnesses;

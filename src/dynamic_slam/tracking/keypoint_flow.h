@@ -55,8 +55,8 @@ class KeypointFlow {
   double radius_px_ = 1;
   bool is_of_witnesses_ = false;
   std::vector<uint32_t> last_keypoints_, before_;  // before_: those of the last frame
-  std::vector<uint8_t> near_;                      // of the last frame's keypoints: 1 in or around a box
-  std::vector<uint32_t> asked_;                    // of them
+  std::vector<uint8_t> near_;    // of the last frame's keypoints: WitnessesOf the boxes about it
+  std::vector<uint32_t> asked_;  // of them
   std::vector<int> distances_;
   std::vector<PointMotion> motions_;
 };

@@ -16,14 +16,14 @@ void ChooseWitnesses(const Frame& frame, std::span<const uint8_t> candidates,
     uint32_t best = 0;
     float most = -1;
     for (const uint32_t i : cell) {
-      const bool is_known = frame.landmarks[i].IsValid();
+      const bool speaks_for_itself = ((candidates[i] & kOfFew) != 0) | frame.landmarks[i].IsValid();
       const bool was_followed = !last_keypoints.empty() && last_keypoints[i] != kNotFollowed;
       const float worth = frame.features.keypoints[i].response + (was_followed ? kFollowed : 0);
       const bool is_better = (candidates[i] != 0) & (worth > most);
       best = is_better ? i : best;
       most = is_better ? worth : most;
       (*witnesses)[count] = i;
-      count += static_cast<size_t>((candidates[i] != 0) & is_known);
+      count += static_cast<size_t>((candidates[i] != 0) & speaks_for_itself);
     }
     if (count == before && most >= 0) (*witnesses)[count++] = best;
   });

@@ -25,7 +25,7 @@ class WitnessesTest : public ::testing::Test {
     frame_.features.descriptors.emplace_back();
     last_keypoints_.push_back(followed ? 5 : kNotFollowed);
     has_landmark_.push_back(landmark);
-    candidates_.push_back(candidate ? 1 : 0);
+    candidates_.push_back(candidate ? kOfMany : 0);
   }
 
   std::vector<uint32_t> Choose() {
@@ -60,6 +60,17 @@ TEST_F(WitnessesTest, AllWithALandmark) {
   Add(2, 2, 50, true);
   Add(3, 9, 20, false, true);
   Add(12, 5, 30, true, true);
+  EXPECT_THAT(Choose(), ::testing::ElementsAre(1, 2));
+}
+
+TEST_F(WitnessesTest, AllInSmallBoxes) {
+  EXPECT_EQ(WitnessesOf({100, 50, 100, 100}), kOfFew);
+  EXPECT_EQ(WitnessesOf({100, 50, 100, 300}), kOfMany);
+  Add(2, 2, 50, true);
+  Add(3, 9, 20);
+  Add(12, 5, 30);
+  candidates_[1] = kOfFew;
+  candidates_[2] = kOfFew | kOfMany;
   EXPECT_THAT(Choose(), ::testing::ElementsAre(1, 2));
 }
 
