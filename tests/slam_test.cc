@@ -182,10 +182,9 @@ TEST_F(SystemTest, WhatFitsNoBetterThanChanceIsNoPose) {
   const Room room = MakeRoom(90);
   std::vector<cv::Mat> images = Frames(room, 0, 90);
   images[80] = Scattered(images[80], 4);
-  ImageSource source(std::move(images));
   SystemOptions options;
   options.orb.levels = 1;  // all corners are equally exact
-  const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+  const WholeRun run = RunImages(std::move(images), options);
   const RunSummary& summary = run.summary;
   EXPECT_EQ(summary.frames[79].state, TrackingState::kTracking);
   EXPECT_EQ(summary.frames[80].state, TrackingState::kLost);
@@ -196,7 +195,10 @@ TEST_F(SystemTest, WhatFitsNoBetterThanChanceIsNoPose) {
 
 TEST_F(SystemTest, ALostCameraIsFoundAgainInItsMap) {
   const Room room = MakeRoom(125), other = MakeRoom(5, 2);
-  const WholeRun run = RunImages(Join(Join(Frames(room, 0, 80), Frames(other, 0, 5)), Frames(room, 85, 125)));
+  SystemOptions options;
+  options.tracker.restart_after_frames = 15;  // only looked for
+  const WholeRun run =
+      RunImages(Join(Join(Frames(room, 0, 80), Frames(other, 0, 5)), Frames(room, 85, 125)), options);
   const RunSummary& summary = run.summary;
   ASSERT_TRUE(summary.initialised_at.has_value());
   EXPECT_EQ(summary.lost_count, 1);
@@ -219,10 +221,10 @@ TEST_F(SystemTest, AFoundPlaceThatTheNextImageDoesNotConfirmIsWithdrawn) {
       Join(Join(Join(Frames(room, 0, 80), Frames(other, 0, 5)), Frames(room, 85, 86)),
            Join(Frames(other, 5, 10), Frames(room, 91, 125)));
   for (const bool backfills : {false, true}) {
-    ImageSource source(images);
     SystemOptions options;
     options.backfill = backfills;
-    const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+    options.tracker.restart_after_frames = 15;  // only looked for
+    const WholeRun run = RunImages(images, options);
     const RunSummary& summary = run.summary;
     EXPECT_EQ(summary.frames[85].state, TrackingState::kTracking) << summary.ReasonOf(85);
     EXPECT_THAT(summary.ReasonOf(86), HasSubstr("withdrawn"));
@@ -292,8 +294,7 @@ TEST_F(SystemTest, WhereFramesOfOneMapFollowThoseOfAnotherTheyAreOne) {
   options.orb.features = 400;
   for (const bool joins : {false, true}) {
     options.loop.enabled = joins;
-    ImageSource source(images);
-    const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+    const WholeRun run = RunImages(images, options);
     EXPECT_EQ(run.summary.maps, joins ? 1u : 2u);
     EXPECT_EQ(run.summary.loops.joined, joins ? 1 : 0);
     const size_t frames = run.system->FrameTrajectory().size();
@@ -313,11 +314,10 @@ TEST_F(SystemTest, ThePathIsSmootherThanItsPosesAndTheMapIsTheSame) {
   double jolts[2], errors[2];
   Trajectory keyframes[2];
   for (const bool is_smooth : {false, true}) {
-    ImageSource source(Frames(room, 0, 90));
     SystemOptions options;
     options.orb.features = 300;  // noisy
     options.smooth_path = is_smooth;
-    const WholeRun run = RunAll(source, DefaultRoomCamera(), options);
+    const WholeRun run = RunImages(Frames(room, 0, 90), options);
     const Trajectory path = run.system->FrameTrajectory();
     double sum = 0;
     for (size_t i = 2; i < path.size(); ++i) {

@@ -47,9 +47,9 @@ inline WholeRun RunAll(FrameSource& source, const Camera& camera, const SystemOp
   return run;
 }
 
-inline WholeRun RunImages(std::vector<cv::Mat> images) {
+inline WholeRun RunImages(std::vector<cv::Mat> images, const SystemOptions& options = {}) {
   ImageSource source(std::move(images));
-  return RunAll(source, DefaultRoomCamera());
+  return RunAll(source, DefaultRoomCamera(), options);
 }
 
 // Rooted mean square of the absolute position errors after sim(3) alignment, m.

@@ -16,6 +16,9 @@ constexpr double kWideSearch = 3.0;
 // A motion is not carried on for longer than so many times the time in which it was seen.
 constexpr double kMaxPredictionSteps = 5;
 
+// Who saw nothing for so many frames, half a second, may be anywhere.
+constexpr int kMostDarkFrames = 15;
+
 // An uncertain start is believed after so many frames without a better one.
 constexpr uint32_t kMaxReviews = 60;
 
@@ -136,7 +139,7 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
       result.last_was_withdrawn = std::exchange(is_unconfirmed_, false);
       if (result.last_was_withdrawn) reason_ += "; the last pose, found by its looks, is withdrawn";
     }
-    ++lost_frames_;
+    lost_frames_ = follows_nothing_ && !shows_nothing_ ? 1 : lost_frames_ + 1;
     StartAnewWhenLostForLong(&result);
   }
   RememberKeyframes(result.new_keyframes);
@@ -480,7 +483,8 @@ void Tracker::InsertKeyframeIfDue(int keyframes_waiting, TrackingResult* result)
 // A map that lost the camera so soon was probably wrong from the start; another one is kept, and becomes one
 // with the new one when a place in it is known again.
 void Tracker::StartAnewWhenLostForLong(TrackingResult* result) {
-  if (lost_frames_ < options_.restart_after_frames || options_.localise_only) return;
+  const int patience = shows_nothing_ ? kMostDarkFrames : options_.restart_after_frames;
+  if (lost_frames_ < patience || options_.localise_only) return;
   const PartId part = PartOfFrame();
   const int keyframes =
       part.IsValid() ? KeyframesIn(part) : static_cast<int>(map_->Read()->keyframes().size());
