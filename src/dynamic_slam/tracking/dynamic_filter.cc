@@ -12,7 +12,6 @@
 #include "dynamic_slam/semantics/point_motion.h"
 #include "dynamic_slam/semantics/selective_tracking.h"
 #include "dynamic_slam/tracking/rest_flow.h"
-#include "dynamic_slam/tracking/witnesses.h"
 
 namespace dynamic_slam {
 namespace {
@@ -161,7 +160,6 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     counts.outside = static_cast<int>(n);
     return counts;
   }
-  in_box_.assign(n, 0);
   if (weights && options_.motion) {
     for (size_t i = 0; i < n; ++i) {
       const uint32_t from = flow.last_keypoints()[i];
@@ -169,6 +167,7 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     }
     if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   }
+  in_box_.resize(n);
   prior_.resize(n);
   for (size_t i = 0; i < n; ++i) {
     const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &in_box_[i]);
@@ -198,10 +197,8 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
   std::vector<Object> objects;
   for (const DynamicBox& box : boxes) {
     if (!box.is_dynamic) continue;
-    objects.push_back({.box = box,
-                       .margin_px = MarginOf(box.box),
-                       .witnesses = WitnessesOf(box.box),
-                       .moves = std::min(box.probability, kMostProbability)});
+    objects.push_back(
+        {.box = box, .margin_px = MarginOf(box.box), .moves = std::min(box.probability, kMostProbability)});
   }
   if (objects.empty()) return;
   static_probability->resize(features.size(), 1.0f);

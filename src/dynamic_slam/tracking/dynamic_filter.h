@@ -11,6 +11,7 @@
 #include "dynamic_slam/tracking/dynamic_options.h"
 #include "dynamic_slam/tracking/keypoint_flow.h"
 #include "dynamic_slam/tracking/past_views.h"
+#include "dynamic_slam/tracking/witnesses.h"
 
 namespace dynamic_slam {
 
@@ -69,11 +70,11 @@ class DynamicFilter {
   // Something whose class is dynamic.
   struct Object {
     DynamicBox box;
-    double margin_px = 0;        // by which it may reach out of its box
-    uint8_t witnesses = 0;       // WitnessesOf its box
-    double moves = 1;            // P(moves) by its class and its motion so far
-    double motion_log_odds = 0;  // of moving: what its motion tells beside the class
-    ShiftHistory shifts = {};    // while the pose was known
+    double margin_px = 0;         // by which it may reach out of its box
+    uint8_t witnesses = kOfMany;  // WitnessesOf its box
+    double moves = 1;             // P(moves) by its class and its motion so far
+    double motion_log_odds = 0;   // of moving: what its motion tells beside the class
+    ShiftHistory shifts = {};     // while the pose was known
 
     bool IsMoving() const { return moves >= 0.5; }
   };

@@ -1,7 +1,5 @@
 #include "dynamic_slam/tracking/witnesses.h"
 
-#include <algorithm>
-
 namespace dynamic_slam {
 
 // Without branches for single keypoints, as which of them are candidates, known or followed is hard to
