@@ -187,6 +187,21 @@ TEST_F(DegenerateTest, WhileTracking) {
   }
 }
 
+// Where nothing is to be seen there is nothing to start from.
+TEST_F(DegenerateTest, TwoLostImagesAreFollowedByANewStartButDarkOnesAreWaitedFor) {
+  std::vector<cv::Mat> images = SmallRoom::Get().images;
+  const size_t dark = images.size(), lost = dark + 4;
+  images.insert(images.end(), 4, SmallRoom::BlackImage());
+  for (int i = 0; i < 3; ++i) images.push_back(Noise().image(i));
+  const WholeRun run = RunFilm(std::move(images));
+  const RunSummary& summary = run.summary;
+  ASSERT_EQ(summary.frames[dark - 1].state, TrackingState::kTracking);
+  for (size_t i = dark; i <= lost; ++i) EXPECT_EQ(summary.frames[i].state, TrackingState::kLost) << i;
+  EXPECT_EQ(summary.frames[lost + 1].state, TrackingState::kInitialising);
+  EXPECT_THAT(summary.ReasonOf(lost + 1), HasSubstr("starting again: lost for 2 frames"));
+  EXPECT_EQ(summary.frames[lost + 2].state, TrackingState::kInitialising);
+}
+
 TEST_F(DegenerateTest, AMoverThatFillsTheViewMakesNoMap) {
   std::vector<DetectionSet> sets;
   for (int i = 0; i < kFrames; ++i) sets.push_back({FrameId(0), i / 30.0, {{{0, 0, 320, 240}, 0, 0.9}}});
