@@ -108,7 +108,7 @@ ShuffledRun RunShuffled(uint64_t seed, Event event) {
   const size_t when = 7 + random.Index(9);
   play(event == Event::kNone ? room.images.size() : when);
   if (event == Event::kLoss) {
-    for (int i = 0; i < 3; ++i) process(SmallRoom::BlackImage(), Rigid3());
+    for (int i = 0; i < 3; ++i) process(SmallRoom::NoiseImage(i), Rigid3());
   }
   if (event == Event::kReset) system.Reset();
   if (event == Event::kLoss || event == Event::kReset) play(20);
@@ -311,7 +311,7 @@ TEST(PlantedTest, AnEpochThatIsReadTooLateIsFound) {
     try {
       for (int i = 0; i < 16; ++i) {
         tracker.Extract(FrameId(static_cast<uint32_t>(i)), room.Stamp(i),
-                        i < 12 ? room.image(i) : SmallRoom::BlackImage(), {});
+                        i < 12 ? room.image(i) : SmallRoom::NoiseImage(i), {});
         const TrackingResult result = tracker.Track({}, executor.Waiting(Lane::kMapping));
         for (const KeyframeId keyframe : result.new_keyframes) {
           executor.Post(Lane::kMapping,

@@ -89,16 +89,6 @@ Film Mover() {
       }};
 }
 
-Film Noise() {
-  return {"noise", "matches", [](int frame) {
-            Random random(static_cast<uint64_t>(frame));
-            cv::Mat image(240, 320, CV_8UC1);
-            for (auto pixel = image.begin<uint8_t>(); pixel != image.end<uint8_t>(); ++pixel)
-              *pixel = static_cast<uint8_t>(random.Index(256));
-            return image;
-          }};
-}
-
 std::vector<cv::Mat> Images(const Film& film) {
   std::vector<cv::Mat> images;
   for (int i = 0; i < kFrames; ++i) images.push_back(film.image(i));
@@ -120,7 +110,7 @@ std::vector<Film> Films() {
           OfWall("no_texture", "texture", cv::Mat(64, 64, CV_8UC1, cv::Scalar(128))),
           OfWall("repeated_texture", "matches", Tiles()),
           Mover(),
-          Noise()};
+          {"noise", "matches", SmallRoom::NoiseImage}};
 }
 
 class DegenerateTest : public FolderTest {
@@ -192,7 +182,7 @@ TEST_F(DegenerateTest, TwoLostImagesAreFollowedByANewStartButDarkOnesAreWaitedFo
   std::vector<cv::Mat> images = SmallRoom::Get().images;
   const size_t dark = images.size(), lost = dark + 4;
   images.insert(images.end(), 4, SmallRoom::BlackImage());
-  for (int i = 0; i < 3; ++i) images.push_back(Noise().image(i));
+  for (int i = 0; i < 3; ++i) images.push_back(SmallRoom::NoiseImage(i));
   const WholeRun run = RunFilm(std::move(images));
   const RunSummary& summary = run.summary;
   ASSERT_EQ(summary.frames[dark - 1].state, TrackingState::kTracking);

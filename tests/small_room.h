@@ -5,6 +5,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/random.h"
 #include "dynamic_slam/sim/room.h"
 #include "dynamic_slam/system/system_options.h"
 
@@ -49,6 +50,14 @@ struct SmallRoom {
     return options;
   }
   static cv::Mat BlackImage() { return cv::Mat::zeros(240, 320, CV_8UC1); }
+  // Full of corners, none of them the room's.
+  static cv::Mat NoiseImage(int seed) {
+    Random random(static_cast<uint64_t>(seed));
+    cv::Mat image(240, 320, CV_8UC1);
+    for (auto pixel = image.begin<uint8_t>(); pixel != image.end<uint8_t>(); ++pixel)
+      *pixel = static_cast<uint8_t>(random.Index(256));
+    return image;
+  }
 
   double Stamp(int frame) const { return room.truth()[static_cast<size_t>(frame)].timestamp_s; }
   const cv::Mat& image(int frame) const { return images[static_cast<size_t>(frame)]; }
