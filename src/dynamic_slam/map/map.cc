@@ -85,8 +85,9 @@ void Map::Replace(Map other) {
 }
 
 void Map::GoBackTo(Map earlier) {
-  const uint32_t revision = revision_;
+  const uint32_t epoch = epoch_, revision = revision_;
   *this = std::move(earlier);
+  epoch_ = epoch + 1;
   revision_ = revision + 1;
 }
 
@@ -116,6 +117,12 @@ std::vector<PartId> Map::Parts() const {
   std::sort(parts.begin(), parts.end(),
             [this](PartId a, PartId b) { return origins_[a.value()] < origins_[b.value()]; });
   return parts;
+}
+
+int Map::KeyframesIn(PartId part) const {
+  int keyframes = 0;
+  keyframes_.ForEach([&](const Keyframe& keyframe) { keyframes += keyframe.part() == part; });
+  return keyframes;
 }
 
 bool Map::IsOrigin(KeyframeId id) const { return origins_[keyframes_.At(id).part().value()] == id; }

@@ -31,7 +31,8 @@ class Map {
   void Reset();
   // Becomes another map, as after Reset.
   void Replace(Map other);
-  // Becomes a copy of itself from before, and what was kept with it means the same again.
+  // Becomes a copy of itself from before: ids that were given since mean nothing any more, older ones the
+  // same again. The epoch counts up.
   void GoBackTo(Map earlier);
   uint32_t epoch() const { return epoch_; }
 
@@ -49,6 +50,7 @@ class Map {
 
   // Parts with keyframes, in the order of their oldest ones.
   std::vector<PartId> Parts() const;
+  int KeyframesIn(PartId part) const;
 
   // Whether the keyframe is the oldest of its part: nothing moves it but MergePart.
   bool IsOrigin(KeyframeId id) const;

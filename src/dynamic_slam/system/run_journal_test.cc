@@ -24,7 +24,8 @@ class RunJournalTest : public testing::Test {
     record.timestamp_s = 0.1 * i;
     record.state = part < 0 ? TrackingState::kLost : TrackingState::kTracking;
     record.map_was_erased = map_was_erased;
-    journal->Add(record, part < 0 ? "12 inliers, 35 needed" : "", PartId(static_cast<uint32_t>(std::max(part, 0))), PoseAt(i));
+    journal->Add(record, part < 0 ? "12 inliers, 35 needed" : "",
+                 PartId(static_cast<uint32_t>(std::max(part, 0))), PoseAt(i));
   }
 
   std::filesystem::path folder_ =

@@ -19,6 +19,12 @@
 namespace dynamic_slam {
 namespace {
 
+// Of the frames of a part, so many must be found in another before it is given up for that.
+constexpr double kNearlyAll = 0.75;
+
+// So near to a leap its side may stand wrong: a third of a second was seen. As much as can be found again.
+constexpr double kEnds_s[] = {2.0 / 3, 1.0 / 3, 1.0 / 6};
+
 double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -29,6 +35,15 @@ bool IsSameCamera(const Camera& a, const Camera& b) {
     return std::tuple(c.width, c.height, c.model, c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4);
   };
   return numbers(a) == numbers(b);
+}
+
+// Whether the part has keyframes of a map that was loaded.
+bool IsFromFile(const Map& map, PartId part) {
+  bool is_from_file = false;
+  map.keyframes().ForEach([&](const Keyframe& keyframe) {
+    is_from_file |= keyframe.part() == part && !keyframe.frame_id().IsValid();
+  });
+  return is_from_file;
 }
 
 class NoWork final : public cv::ParallelLoopBody {
@@ -239,29 +254,28 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   DrainMapping();
   const bool changes_map = !options_.tracker.localise_only;
   if (backfiller_.has_value() && options_.backfill_grows_map && changes_map) {
-    Backfill(true, should_stop);
+    tracked_.AddFound(Backfill(tracked_.Poses(), true, should_stop));
     DrainMapping();
     if (options_.loop.enabled) CloseBorders(should_stop);
+    if (refiner_.has_value()) GrowOverParts(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
-  if (backfiller_.has_value()) Backfill(false, should_stop);
+  if (backfiller_.has_value()) tracked_.AddFound(Backfill(tracked_.Poses(), false, should_stop));
   if (refiner_.has_value() && changes_map) tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
   if (changes_map && refiner_.has_value() && backfiller_.has_value()) CutWrongPieces(should_stop);
   if (mode_ == RunMode::kOffline && options_.smooth_path) tracked_.Smooth(should_stop);
   return bundle;
 }
 
-void SlamSystem::Backfill(bool grows, const std::function<bool()>& should_stop) {
-  const std::vector<AnchoredPose> known = tracked_.Poses();
+std::vector<AnchoredPose> SlamSystem::Backfill(std::span<const AnchoredPose> known, bool grows,
+                                               const std::function<bool()>& should_stop) {
   const uint32_t epoch = map_.Read()->epoch();
   const auto map_keyframe = [this, epoch](KeyframeId keyframe) {
     PostMapping(keyframe, epoch);
     executor_->Drain(Lane::kMapping);
   };
-  const std::vector<AnchoredPose> found =
-      grows ? backfiller_->Grow(known, map_keyframe, should_stop) : backfiller_->Find(known, should_stop);
-  tracked_.AddFound(found);
+  return grows ? backfiller_->Grow(known, map_keyframe, should_stop) : backfiller_->Find(known, should_stop);
 }
 
 void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
@@ -285,23 +299,65 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   }
 }
 
+std::vector<AnchoredPose> SlamSystem::LookAgainFor(const std::set<double>& stamps) {
+  refiner_->ForEachOf(
+      stamps, [this](const Frame& frame, int min_inliers) { backfiller_->Keep(frame, min_inliers, false); });
+  std::vector<AnchoredPose> others = tracked_.Poses();
+  std::erase_if(others, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
+  return others;
+}
+
+void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
+  const std::vector<PartId> parts = tracked_.Parts();
+  for (size_t i = 1; i < parts.size(); ++i) {
+    if (IsFromFile(*map_.Read(), parts[i])) continue;
+    std::set<double> stamps;
+    for (const StampedPose& pose : tracked_.PathOf(parts[i])) stamps.insert(pose.timestamp_s);
+    std::vector<AnchoredPose> known = LookAgainFor(stamps);
+    // For a trial, as most of what nothing joined is elsewhere.
+    Map map = *map_.Read();
+    map_.Write()->ErasePart(parts[i]);
+    std::vector<AnchoredPose> found;
+    for (const bool grows : {true, false}) {
+      const std::vector<AnchoredPose> now = Backfill(known, grows, should_stop);
+      known.insert(known.end(), now.begin(), now.end());
+      found.insert(found.end(), now.begin(), now.end());
+    }
+    size_t count = 0;
+    for (const AnchoredPose& pose : found)
+      count += stamps.contains(pose.timestamp_s) && map_.Read()->PartOf(pose.reference) == parts[0];
+    const bool is_whole = !should_stop || !should_stop();
+    if (is_whole && static_cast<double>(count) >= kNearlyAll * static_cast<double>(stamps.size())) {
+      tracked_.RemoveThoseOfErasedParts();
+      tracked_.AddFound(found);
+      DrainMapping();
+    } else {
+      map_.Write()->GoBackTo(std::move(map));
+      mapped_.Write()->clear();
+    }
+  }
+}
+
 void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
-  const std::vector<TrackedFrames::Piece> pieces = tracked_.PiecesAtLeaps();
+  CutWrong(tracked_.PiecesAtLeaps(), should_stop);
+  for (const double within_s : kEnds_s) {
+    for (const bool is_before : {true, false})
+      CutWrong(tracked_.EndsAtLeaps(within_s, is_before), should_stop);
+  }
+}
+
+void SlamSystem::CutWrong(std::span<const TrackedFrames::Piece> pieces,
+                          const std::function<bool()>& should_stop) {
   if (pieces.empty() || (should_stop && should_stop())) return;
   std::set<double> stamps;
   for (const TrackedFrames::Piece& piece : pieces) {
     for (const auto& [timestamp_s, centre] : piece.centres) stamps.insert(timestamp_s);
   }
-  refiner_->ForEachOf(
-      stamps, [this](const Frame& frame, int min_inliers) { backfiller_->Keep(frame, min_inliers, false); });
-
   // For a trial, as a film with a cut leaps too.
   Map map = *map_.Read();
   const std::vector<AnchoredPose> poses = tracked_.Poses();
-  tracked_.CutOff(pieces);
-  std::vector<AnchoredPose> known = tracked_.Poses();
-  std::erase_if(known, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
-  std::vector<AnchoredPose> found = backfiller_->Find(known, should_stop);
+  for (const PartId part : tracked_.CutOff(pieces)) map_.Write()->ErasePart(part);
+  std::vector<AnchoredPose> found = Backfill(LookAgainFor(stamps), false, should_stop);
   const bool is_whole = !should_stop || !should_stop();
   std::vector<TrackedFrames::Piece> wrong;
   for (const TrackedFrames::Piece& piece : pieces) {
@@ -316,14 +372,15 @@ void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
   tracked_.Replace(poses);
 
   if (wrong.empty()) return;
-  pieces_cut_ = static_cast<int>(wrong.size());
+  pieces_cut_ += static_cast<int>(wrong.size());
   const std::vector<PartId> parts = tracked_.CutOff(wrong);
   tracked_.AddFound(found);
-  const std::vector<PartId> with_frames = tracked_.Parts();
   for (const PartId part : parts) {
-    if (std::find(with_frames.begin(), with_frames.end(), part) == with_frames.end())
+    // What tracking would not keep of a start, it does not keep of an end.
+    if (std::ssize(tracked_.PathOf(part)) <= options_.tracker.small_map_keyframes)
       map_.Write()->ErasePart(part);
   }
+  tracked_.RemoveThoseOfErasedParts();
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {

@@ -6,6 +6,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
+#include <span>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -147,14 +149,20 @@ class SlamSystem {
                               std::chrono::steady_clock::time_point start);
   void ThrowIfFailed() const;
   void Remember(const FrameResult& result);
-  // Looks for poses of frames that have none; grows: and lets the map grow by them.
-  void Backfill(bool grows, const std::function<bool()>& should_stop);
+  // Looks for poses of frames that have none, those that are not known; grows: and lets the map grow by them.
+  std::vector<AnchoredPose> Backfill(std::span<const AnchoredPose> known, bool grows,
+                                     const std::function<bool()>& should_stop);
   // Makes one of parts of the map where frames of one follow those of another, and mends a part that has such
   // a border in itself.
   void CloseBorders(const std::function<bool()>& should_stop);
+  // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
+  void GrowOverParts(const std::function<bool()>& should_stop);
   // Pieces of the path from which the camera cannot have come, and whose frames the rest of the map has
   // elsewhere, become parts of their own; those frames get their pose in the rest.
   void CutWrongPieces(const std::function<bool()>& should_stop);
+  void CutWrong(std::span<const TrackedFrames::Piece> pieces, const std::function<bool()>& should_stop);
+  // Frames that are looked for again, as if they had no pose. Returns the poses of all others.
+  std::vector<AnchoredPose> LookAgainFor(const std::set<double>& stamps);
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops

@@ -13,7 +13,8 @@
 namespace dynamic_slam {
 namespace {
 
-// With this share of its frames on one side of all leaps it is clear which side stands wrong: the other.
+// With this share of its frames on one side of all leaps it is clear which side stands wrong: the other. With
+// this share of them found elsewhere a piece can be done without.
 constexpr double kNearlyAll = 0.75;
 
 // By fewer poses that were found again nobody can tell whether a piece stands wrong: a few are found by
@@ -101,6 +102,23 @@ std::vector<TrackedFrames::Piece> TrackedFrames::PiecesAtLeaps() const {
   return pieces;
 }
 
+std::vector<TrackedFrames::Piece> TrackedFrames::EndsAtLeaps(double within_s, bool is_before) const {
+  std::vector<Piece> ends;
+  for (const PartId part : Parts()) {
+    const Trajectory path = PathOf(part);
+    for (const PathLeap& leap : FindLeaps(Smoothed(path))) {
+      Piece end{.part = part, .centres = {}, .is_end = true};
+      for (const StampedPose& pose : path) {
+        const double away_s = is_before ? leap.to_s - pose.timestamp_s : pose.timestamp_s - leap.from_s;
+        if (away_s > 0 && away_s <= within_s)
+          end.centres.emplace(pose.timestamp_s, pose.world_from_cam.translation);
+      }
+      if (!end.centres.empty()) ends.push_back(std::move(end));
+    }
+  }
+  return ends;
+}
+
 std::vector<PartId> TrackedFrames::CutOff(std::span<const Piece> pieces) {
   std::vector<PartId> parts;
   for (const Piece& piece : pieces) {
@@ -145,17 +163,39 @@ PartId TrackedFrames::CutOff(const Piece& piece) {
 }
 
 bool TrackedFrames::IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const {
-  size_t elsewhere = 0, count = 0;
-  const auto map = map_->Read();
-  for (const AnchoredPose& pose : found) {
-    const auto before = piece.centres.find(pose.timestamp_s);
-    if (before == piece.centres.end() || map->PartOf(pose.reference) != piece.part) continue;
-    const Eigen::Vector3d now = CamFromWorld(*map, pose).TargetOriginInSource();
-    ++count;
-    elsewhere += (now - before->second).norm() > piece.longest_step;
+  Trajectory now;
+  {
+    const auto map = map_->Read();
+    for (const AnchoredPose& pose : found) {
+      if (piece.centres.contains(pose.timestamp_s) && map->PartOf(pose.reference) == piece.part)
+        now.push_back({pose.timestamp_s, CamFromWorld(*map, pose).Inverse()});
+    }
   }
-  const double share = static_cast<double>(count) / static_cast<double>(piece.centres.size());
-  return count >= kMinFound && share >= kMinFoundShare && 2 * elsewhere > count;
+  return piece.is_end ? IsMended(piece, now) : IsElsewhere(piece, now);
+}
+
+bool TrackedFrames::IsElsewhere(const Piece& piece, const Trajectory& found) const {
+  size_t elsewhere = 0;
+  for (const StampedPose& pose : found) {
+    const Eigen::Vector3d& before = piece.centres.at(pose.timestamp_s);
+    elsewhere += (pose.world_from_cam.translation - before).norm() > piece.longest_step;
+  }
+  const double share = static_cast<double>(found.size()) / static_cast<double>(piece.centres.size());
+  return found.size() >= kMinFound && share >= kMinFoundShare && 2 * elsewhere > found.size();
+}
+
+bool TrackedFrames::IsMended(const Piece& piece, const Trajectory& found) const {
+  const double share = static_cast<double>(found.size()) / static_cast<double>(piece.centres.size());
+  if (share < kNearlyAll) return false;
+  Trajectory path = PathOf(piece.part);
+  std::erase_if(path, [&](const StampedPose& pose) { return piece.centres.contains(pose.timestamp_s); });
+  path.insert(path.end(), found.begin(), found.end());
+  std::sort(path.begin(), path.end(),
+            [](const StampedPose& a, const StampedPose& b) { return a.timestamp_s < b.timestamp_s; });
+  const std::vector<PathLeap> leaps = FindLeaps(Smoothed(path));
+  return std::none_of(leaps.begin(), leaps.end(), [&](const PathLeap& leap) {
+    return leap.from_s <= piece.centres.rbegin()->first && leap.to_s >= piece.centres.begin()->first;
+  });
 }
 
 void TrackedFrames::Smooth(const std::function<bool()>& should_stop) {

@@ -36,19 +36,25 @@ class TrackedFrames {
   struct Piece {
     PartId part;
     std::map<double, Eigen::Vector3d> centres;  // of the camera, by stamp
-    double longest_step;                        // of the rest of the part (LongestStep)
+    double longest_step = 0;                    // of the rest of the part (LongestStep)
+    bool is_end = false;                        // of what lies on one side of a leap, else all of it
   };
 
   // Where the path of a part leaps, which the camera cannot have done, either that part does not fit together
   // or the film has a cut. If nearly all of it is on one side of every leap: what is on the other.
   std::vector<Piece> PiecesAtLeaps() const;
 
+  // The frames no longer than that before every leap, or after it: tracking goes astray before it is lost,
+  // and may have begun so.
+  std::vector<Piece> EndsAtLeaps(double within_s, bool is_before) const;
+
   // Keyframes of the pieces become parts of their own, one for each piece that has some, and its frames hang
   // on these; all others hang on the rest. Returns those parts.
   std::vector<PartId> CutOff(std::span<const Piece> pieces);
 
-  // Whether the piece stood wrong in its part: of a quarter of its frames or more a pose was found in the
-  // rest, and most of these are farther away than the camera moves from one frame to the next.
+  // Whether the piece, cut off, stood wrong in its part, by the poses that were found in the rest. A whole
+  // side of a leap: of a quarter of its frames or more, and most of these are farther away than the camera
+  // moves from one frame to the next. An end: of nearly all, and with them the path leaps there no more.
   bool IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const;
 
   // The path of each part becomes what is most probable (SmoothPath). `should_stop` may be empty.
@@ -74,6 +80,8 @@ class TrackedFrames {
   };
 
   PartId CutOff(const Piece& piece);
+  bool IsElsewhere(const Piece& piece, const Trajectory& found) const;
+  bool IsMended(const Piece& piece, const Trajectory& found) const;
 
   std::vector<TrackedFrame> All() const { return {frames_.begin(), frames_.end()}; }
 

@@ -1,6 +1,7 @@
 #include "dynamic_slam/system/tracked_frames.h"
 
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -12,6 +13,7 @@ namespace dynamic_slam {
 namespace {
 
 using testing::IsEmpty;
+using testing::SizeIs;
 
 // A camera that goes sideways at a unit a second, with ten frames a second, every tenth of them a keyframe.
 class TrackedFramesTest : public testing::Test {
@@ -117,6 +119,34 @@ TEST_F(TrackedFramesTest, APieceIsWrongWhereItsFramesAreFoundElsewhere) {
   std::vector<AnchoredPose> mixed = found(12, 0);
   for (size_t i = 0; i < 6; ++i) mixed[i] = found(12, -kAway)[i];
   EXPECT_FALSE(tracked_.IsWrong(pieces[0], mixed));
+}
+
+TEST_F(TrackedFramesTest, AnEndAtALeapIsWrongWhereThePathLeapsNoMoreWithoutIt) {
+  Go(100, 36, 42);
+  EXPECT_THAT(tracked_.EndsAtLeaps(0.05, true), IsEmpty()) << "no frame is so near";
+  const std::vector<TrackedFrames::Piece> ends = tracked_.EndsAtLeaps(1.0, true);
+  ASSERT_THAT(ends, SizeIs(2));
+  const TrackedFrames::Piece& end = ends[1];
+  EXPECT_LE(end.centres.begin()->first, Stamp(36));
+  EXPECT_GE(end.centres.rbegin()->first, Stamp(41));
+  EXPECT_LE(end.centres.rbegin()->first, Stamp(43)) << "a smooth path leaps in several steps";
+  EXPECT_GT(tracked_.EndsAtLeaps(1.0, false)[1].centres.begin()->first, Stamp(38)) << "after it";
+  ASSERT_EQ(tracked_.CutOff(std::span(&end, 1)).size(), 1u);
+  // All but some of them, each so far from its place.
+  const auto found = [&](size_t without, double away) {
+    std::vector<AnchoredPose> poses;
+    for (const auto& [timestamp_s, centre] : end.centres) {
+      if (poses.size() + without == end.centres.size()) break;
+      const Rigid3 pose = SidewaysPose(timestamp_s + away);
+      poses.push_back({timestamp_s, keyframes_[5], map_.Read()->CamFromReference(keyframes_[5], pose)});
+    }
+    return poses;
+  };
+  EXPECT_TRUE(tracked_.IsWrong(end, found(0, 0)));
+  EXPECT_TRUE(tracked_.IsWrong(end, found(2, 0)));
+  EXPECT_FALSE(tracked_.IsWrong(end, found(4, 0))) << "too many of them would have no pose";
+  EXPECT_FALSE(tracked_.IsWrong(end, found(0, kAway))) << "it leaps as before";
+  EXPECT_FALSE(tracked_.IsWrong(end, {}));
 }
 
 TEST_F(TrackedFramesTest, OfTwoHalvesNobodyCanTellWhichStandsWrong) {

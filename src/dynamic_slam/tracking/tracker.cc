@@ -146,8 +146,8 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   last_has_pose_ = state_ == TrackingState::kTracking || shows_nothing_;
   if (start_is_young_ && state_ == TrackingState::kTracking) {
     const PartId part = PartOfFrame();
-    start_is_young_ =
-        part == start_part_ && (!start_is_certain_ || KeyframesIn(part) <= options_.small_map_keyframes);
+    start_is_young_ = part == start_part_ &&
+                      (!start_is_certain_ || map_->Read()->KeyframesIn(part) <= options_.small_map_keyframes);
   }
   result.is_provisional = start_is_young_ || is_unconfirmed_;
   result.min_inliers = Limits().found;
@@ -254,12 +254,6 @@ void Tracker::ReviewStart(TrackingResult* result) {
   }
   start_is_certain_ = true;
   initializer_.Reset();
-}
-
-int Tracker::KeyframesIn(PartId part) const {
-  int keyframes = 0;
-  map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) { keyframes += keyframe.part() == part; });
-  return keyframes;
 }
 
 PartId Tracker::PartOfFrame() const { return map_->Read()->PartOf(frame_.reference); }
@@ -487,7 +481,7 @@ void Tracker::StartAnewWhenLostForLong(TrackingResult* result) {
   if (lost_frames_ < patience || options_.localise_only) return;
   const PartId part = PartOfFrame();
   const int keyframes =
-      part.IsValid() ? KeyframesIn(part) : static_cast<int>(map_->Read()->keyframes().size());
+      part.IsValid() ? map_->Read()->KeyframesIn(part) : static_cast<int>(map_->Read()->keyframes().size());
   // Only what was started here may be wrong.
   const bool is_small = part.IsValid() && part == start_part_ && keyframes <= options_.small_map_keyframes;
   reason_ = fmt::format("starting again: lost for {} frames; the map of {} keyframes is {}", lost_frames_,

@@ -97,7 +97,6 @@ class Tracker {
   void CorrectShutter();
   void ForgetPose();
   PartId PartOfFrame() const;
-  int KeyframesIn(PartId part) const;
   bool ShowsNothing();
   bool TrackFrame();
   bool TrackFromLastFrame();
