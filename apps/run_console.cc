@@ -99,6 +99,10 @@ void PrintSummary(const RunSummary& summary) {
   } else {
     fmt::print("no map was made: {}\n", summary.last_reason);
   }
+  if (summary.frames_in_other_maps > 0) {
+    fmt::print("{} frames are in other maps, which nothing joins to this one: trajectory_2.txt and on\n",
+               summary.frames_in_other_maps);
+  }
   if (summary.pieces_cut > 0) {
     fmt::print("{} of the path stood wrong and {} cut off; what is not found again in the rest is apart\n",
                summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),

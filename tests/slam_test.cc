@@ -277,6 +277,7 @@ TEST_F(SystemTest, LostForLongItStartsAnotherMapAndKeepsBoth) {
   EXPECT_EQ(summary.maps, 2u);
   EXPECT_GE(run.system->FrameTrajectory().size(), 130u);
   EXPECT_GE(run.system->FrameTrajectory(parts[1]).size(), 10u);
+  EXPECT_EQ(summary.frames_in_other_maps, run.system->FrameTrajectory(parts[1]).size());
   EXPECT_LE(summary.frames_tracked, run.system->FrameTrajectory().size()) << "of the main map";
   EXPECT_THAT(run.system->map().Read()->Validate(), IsEmpty());
   WriteResults(folder_, *run.system, summary);

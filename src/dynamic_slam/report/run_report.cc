@@ -97,6 +97,10 @@ Json TilesSection(const Run& run) {
     tiles.push_back(Tile("keypoints in dynamic boxes", fmt::format("{:.1f}%", 100 * s.mean_dynamic_ratio),
                          fmt::format("mean; detector {}", s.detector)));
   }
+  if (s.frames_in_other_maps > 0) {
+    tiles.push_back(Tile("frames in other maps", fmt::format("{}", s.frames_in_other_maps),
+                         "nothing joins them to this one: trajectory_2.txt and on", "wait"));
+  }
   if (!s.leaps.empty()) {
     tiles.push_back(
         Tile("leaps of the path", fmt::format("{}", s.leaps.size()),

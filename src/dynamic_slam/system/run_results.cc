@@ -33,6 +33,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
   json["keyframes"] = summary.keyframes;
   json["landmarks"] = summary.landmarks;
   json["maps"] = summary.maps;
+  json["frames_in_other_maps"] = summary.frames_in_other_maps;
   if (summary.initialised_at.has_value()) {
     json["initialised_at"] = *summary.initialised_at;
   } else {

@@ -36,6 +36,7 @@ struct RunSummary {
   size_t frames_dropped = 0;     // realtime: came while tracking was late
   size_t keyframes = 0, landmarks = 0;
   size_t maps = 0;                       // parts of the map that nothing ties together
+  size_t frames_in_other_maps = 0;       // have a pose, but not in the one with the most
   std::optional<size_t> initialised_at;  // frame, counted from 0
   int lost_count = 0;                    // times that tracking was lost
   int reset_count = 0;         // times that a map was given up: lost while small, or started wrongly
