@@ -84,13 +84,6 @@ void Map::Replace(Map other) {
   revision_ = revision + 1;
 }
 
-void Map::GoBackTo(Map earlier) {
-  const uint32_t epoch = epoch_, revision = revision_;
-  *this = std::move(earlier);
-  epoch_ = epoch + 1;
-  revision_ = revision + 1;
-}
-
 Keyframe& Map::AddKeyframe(FrameId frame, double timestamp_s, const Rigid3& cam_from_world,
                            FeatureSet features, KeypointGrid grid, std::vector<float> static_probability,
                            PartId part) {

@@ -29,11 +29,8 @@ class Map {
   // Empties the map. Ids start again from 0, so that those of before mean nothing any more: whoever keeps ids
   // while the map is unlocked compares the epoch, which changes with ErasePart too.
   void Reset();
-  // Becomes another map, as after Reset.
+  // Becomes another map, as after Reset, or itself again as it was before a trial.
   void Replace(Map other);
-  // Becomes a copy of itself from before: ids that were given since mean nothing any more, older ones the
-  // same again. The epoch counts up.
-  void GoBackTo(Map earlier);
   uint32_t epoch() const { return epoch_; }
 
   // Counts up when poses and points change all at once, for a loop or in the adjustment of everything: what

@@ -22,7 +22,11 @@ namespace {
 // Of the frames of a part, so many must be found in another before it is given up for that.
 constexpr double kNearlyAll = 0.75;
 
-// So near to a leap its side may stand wrong: a third of a second was seen. As much as can be found again.
+// Longer parts, ten seconds, have a scale of their own; to try takes as long as to track them.
+constexpr size_t kMostGrownOver = 300;
+
+// So long before or after a leap tracking may have gone astray: the longest first, as the path comes back
+// within a frame or two of which that would be mended alone.
 constexpr double kEnds_s[] = {2.0 / 3, 1.0 / 3, 1.0 / 6};
 
 double MillisecondsSince(std::chrono::steady_clock::time_point start) {
@@ -308,16 +312,18 @@ std::vector<AnchoredPose> SlamSystem::LookAgainFor(const std::set<double>& stamp
 }
 
 void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
-  const std::vector<PartId> parts = tracked_.Parts();
-  for (size_t i = 1; i < parts.size(); ++i) {
-    if (IsFromFile(*map_.Read(), parts[i])) continue;
+  for (const PartId part : tracked_.Parts()) {
+    if (should_stop && should_stop()) return;
+    const PartId main = tracked_.Parts().front();
     std::set<double> stamps;
-    for (const StampedPose& pose : tracked_.PathOf(parts[i])) stamps.insert(pose.timestamp_s);
-    std::vector<AnchoredPose> known = LookAgainFor(stamps);
+    for (const StampedPose& pose : tracked_.PathOf(part)) stamps.insert(pose.timestamp_s);
+    if (part == main || stamps.empty() || stamps.size() > kMostGrownOver || IsFromFile(*map_.Read(), part))
+      continue;
     // For a trial, as most of what nothing joined is elsewhere.
     Map map = *map_.Read();
-    map_.Write()->ErasePart(parts[i]);
-    std::vector<AnchoredPose> found;
+    const MappingReport report = *mapping_report_.Read();
+    std::vector<AnchoredPose> known = LookAgainFor(stamps), found;
+    map_.Write()->ErasePart(part);
     for (const bool grows : {true, false}) {
       const std::vector<AnchoredPose> now = Backfill(known, grows, should_stop);
       known.insert(known.end(), now.begin(), now.end());
@@ -325,14 +331,15 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
     }
     size_t count = 0;
     for (const AnchoredPose& pose : found)
-      count += stamps.contains(pose.timestamp_s) && map_.Read()->PartOf(pose.reference) == parts[0];
+      count += stamps.contains(pose.timestamp_s) && map_.Read()->PartOf(pose.reference) == main;
     const bool is_whole = !should_stop || !should_stop();
     if (is_whole && static_cast<double>(count) >= kNearlyAll * static_cast<double>(stamps.size())) {
       tracked_.RemoveThoseOfErasedParts();
       tracked_.AddFound(found);
       DrainMapping();
     } else {
-      map_.Write()->GoBackTo(std::move(map));
+      map_.Write()->Replace(std::move(map));
+      *mapping_report_.Write() = report;
       mapped_.Write()->clear();
     }
   }
@@ -341,14 +348,21 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
 void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
   CutWrong(tracked_.PiecesAtLeaps(), should_stop);
   for (const double within_s : kEnds_s) {
-    for (const bool is_before : {true, false})
-      CutWrong(tracked_.EndsAtLeaps(within_s, is_before), should_stop);
+    for (const bool is_before : {true, false}) {
+      // Each alone, as they may overlap; the leap of one that was cut off is gone.
+      size_t next = 0;
+      for (size_t left = tracked_.EndsAtLeaps(within_s, is_before).size(); left > 0; --left) {
+        const std::vector<TrackedFrames::Piece> ends = tracked_.EndsAtLeaps(within_s, is_before);
+        if (next >= ends.size()) break;
+        next += CutWrong({&ends[next], 1}, should_stop) ? 0 : 1;
+      }
+    }
   }
 }
 
-void SlamSystem::CutWrong(std::span<const TrackedFrames::Piece> pieces,
+bool SlamSystem::CutWrong(std::span<const TrackedFrames::Piece> pieces,
                           const std::function<bool()>& should_stop) {
-  if (pieces.empty() || (should_stop && should_stop())) return;
+  if (pieces.empty() || (should_stop && should_stop())) return false;
   std::set<double> stamps;
   for (const TrackedFrames::Piece& piece : pieces) {
     for (const auto& [timestamp_s, centre] : piece.centres) stamps.insert(timestamp_s);
@@ -361,26 +375,30 @@ void SlamSystem::CutWrong(std::span<const TrackedFrames::Piece> pieces,
   const bool is_whole = !should_stop || !should_stop();
   std::vector<TrackedFrames::Piece> wrong;
   for (const TrackedFrames::Piece& piece : pieces) {
-    if (is_whole && tracked_.IsWrong(piece, found)) {
-      wrong.push_back(piece);
-    } else {
-      std::erase_if(found,
-                    [&](const AnchoredPose& pose) { return piece.centres.contains(pose.timestamp_s); });
-    }
+    if (is_whole && tracked_.IsWrong(piece, found)) wrong.push_back(piece);
   }
-  map_.Write()->GoBackTo(std::move(map));
+  map_.Write()->Replace(std::move(map));
   tracked_.Replace(poses);
 
-  if (wrong.empty()) return;
+  if (wrong.empty()) return false;
+  std::erase_if(found, [&](const AnchoredPose& pose) {
+    return std::none_of(wrong.begin(), wrong.end(), [&](const TrackedFrames::Piece& piece) {
+      return piece.centres.contains(pose.timestamp_s);
+    });
+  });
   pieces_cut_ += static_cast<int>(wrong.size());
   const std::vector<PartId> parts = tracked_.CutOff(wrong);
+  // What is not found of an end went astray; a whole side may be right in itself.
+  for (const TrackedFrames::Piece& piece : wrong) {
+    if (piece.is_end) tracked_.Remove(piece);
+  }
   tracked_.AddFound(found);
+  const std::vector<PartId> with_frames = tracked_.Parts();
   for (const PartId part : parts) {
-    // What tracking would not keep of a start, it does not keep of an end.
-    if (std::ssize(tracked_.PathOf(part)) <= options_.tracker.small_map_keyframes)
+    if (std::find(with_frames.begin(), with_frames.end(), part) == with_frames.end())
       map_.Write()->ErasePart(part);
   }
-  tracked_.RemoveThoseOfErasedParts();
+  return true;
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {

@@ -95,10 +95,10 @@ class SlamSystem {
   FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
   // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
-  // poses of frames that have none yet, joins parts of which one goes on where another ends, tracks all
-  // frames once more, cuts off what stands wrong, and smooths the path. Poses and landmarks are final after
-  // it. `should_stop` may be empty; when it says so, the adjustment ends with what it has. Does nothing after
-  // Stop().
+  // poses of frames that have none yet, joins parts of which one goes on where another ends, grows over
+  // parts that nothing joined, tracks all frames once more, cuts off what stands wrong, and smooths the path.
+  // Poses and landmarks are final after it. `should_stop` may be empty; when it says so, the adjustment ends
+  // with what it has. Does nothing after Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -158,9 +158,11 @@ class SlamSystem {
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
   // Pieces of the path from which the camera cannot have come, and whose frames the rest of the map has
-  // elsewhere, become parts of their own; those frames get their pose in the rest.
+  // elsewhere, become parts of their own; those frames get their pose in the rest. Of ends that went astray
+  // frames that are not found have none any more.
   void CutWrongPieces(const std::function<bool()>& should_stop);
-  void CutWrong(std::span<const TrackedFrames::Piece> pieces, const std::function<bool()>& should_stop);
+  // Whether any of these was cut off.
+  bool CutWrong(std::span<const TrackedFrames::Piece> pieces, const std::function<bool()>& should_stop);
   // Frames that are looked for again, as if they had no pose. Returns the poses of all others.
   std::vector<AnchoredPose> LookAgainFor(const std::set<double>& stamps);
   void PostMapping(KeyframeId keyframe, uint32_t epoch);

@@ -55,6 +55,12 @@ void TrackedFrames::RemoveThoseOfErasedParts() {
   frames_.Assign(left);
 }
 
+void TrackedFrames::Remove(const Piece& piece) {
+  std::vector<TrackedFrame> left = All();
+  std::erase_if(left, [&](const TrackedFrame& frame) { return piece.centres.contains(frame.timestamp_s); });
+  frames_.Assign(left);
+}
+
 void TrackedFrames::AddFound(std::span<const AnchoredPose> poses) {
   std::set<double> stamps;
   for (const AnchoredPose& pose : poses) stamps.insert(pose.timestamp_s);

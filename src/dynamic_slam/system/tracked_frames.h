@@ -20,18 +20,6 @@ namespace dynamic_slam {
 // a file, as there is one for each image.
 class TrackedFrames {
  public:
-  explicit TrackedFrames(SharedMap* map) : map_(map) {}
-
-  // A frame later than all others. is_live: not given its pose by a later frame.
-  void Add(const AnchoredPose& pose, bool is_live) { frames_.push_back(TrackedFrame(pose, is_live)); }
-  void RemoveLast() { frames_.pop_back(); }
-  void RemoveThoseOfErasedParts();
-  // In any order: frames that had none, or one that is given up.
-  void AddFound(std::span<const AnchoredPose> poses);
-  // Poses of frames that have one, in any order, instead.
-  void Replace(std::span<const AnchoredPose> poses);
-  void Clear() { frames_.clear(); }
-
   // Frames of a part of the map that may stand wrong in it.
   struct Piece {
     PartId part;
@@ -40,12 +28,25 @@ class TrackedFrames {
     bool is_end = false;                        // of what lies on one side of a leap, else all of it
   };
 
+  explicit TrackedFrames(SharedMap* map) : map_(map) {}
+
+  // A frame later than all others. is_live: not given its pose by a later frame.
+  void Add(const AnchoredPose& pose, bool is_live) { frames_.push_back(TrackedFrame(pose, is_live)); }
+  void RemoveLast() { frames_.pop_back(); }
+  void RemoveThoseOfErasedParts();
+  void Remove(const Piece& piece);
+  // In any order: frames that had none, or one that is given up.
+  void AddFound(std::span<const AnchoredPose> poses);
+  // Poses of frames that have one, in any order, instead.
+  void Replace(std::span<const AnchoredPose> poses);
+  void Clear() { frames_.clear(); }
+
   // Where the path of a part leaps, which the camera cannot have done, either that part does not fit together
   // or the film has a cut. If nearly all of it is on one side of every leap: what is on the other.
   std::vector<Piece> PiecesAtLeaps() const;
 
-  // The frames no longer than that before every leap, or after it: tracking goes astray before it is lost,
-  // and may have begun so.
+  // The frames no longer than that before the end of every leap, or after its beginning: tracking goes astray
+  // before it is lost, and may have begun so.
   std::vector<Piece> EndsAtLeaps(double within_s, bool is_before) const;
 
   // Keyframes of the pieces become parts of their own, one for each piece that has some, and its frames hang

@@ -130,7 +130,9 @@ TEST_F(TrackedFramesTest, AnEndAtALeapIsWrongWhereThePathLeapsNoMoreWithoutIt) {
   EXPECT_LE(end.centres.begin()->first, Stamp(36));
   EXPECT_GE(end.centres.rbegin()->first, Stamp(41));
   EXPECT_LE(end.centres.rbegin()->first, Stamp(43)) << "a smooth path leaps in several steps";
-  EXPECT_GT(tracked_.EndsAtLeaps(1.0, false)[1].centres.begin()->first, Stamp(38)) << "after it";
+  const std::vector<TrackedFrames::Piece> after = tracked_.EndsAtLeaps(1.0, false);
+  ASSERT_THAT(after, SizeIs(2));
+  EXPECT_GT(after[1].centres.begin()->first, Stamp(38));
   ASSERT_EQ(tracked_.CutOff(std::span(&end, 1)).size(), 1u);
   // All but some of them, each so far from its place.
   const auto found = [&](size_t without, double away) {
@@ -147,6 +149,10 @@ TEST_F(TrackedFramesTest, AnEndAtALeapIsWrongWhereThePathLeapsNoMoreWithoutIt) {
   EXPECT_FALSE(tracked_.IsWrong(end, found(4, 0))) << "too many of them would have no pose";
   EXPECT_FALSE(tracked_.IsWrong(end, found(0, kAway))) << "it leaps as before";
   EXPECT_FALSE(tracked_.IsWrong(end, {}));
+  const size_t frames = tracked_.PathOf(PartId(0)).size();
+  tracked_.Remove(end);
+  EXPECT_THAT(tracked_.Parts(), SizeIs(1)) << "none is left on the part that was cut off";
+  EXPECT_EQ(tracked_.PathOf(PartId(0)).size(), frames);
 }
 
 TEST_F(TrackedFramesTest, OfTwoHalvesNobodyCanTellWhichStandsWrong) {
