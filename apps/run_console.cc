@@ -104,9 +104,11 @@ void PrintSummary(const RunSummary& summary) {
                summary.frames_in_other_maps);
   }
   if (summary.pieces_cut > 0) {
-    fmt::print("{} of the path stood wrong and {} cut off; what is not found again in the rest is apart\n",
-               summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
-               summary.pieces_cut == 1 ? "is" : "are");
+    fmt::print(
+        "{} of the path stood wrong and {} cut off; what is not found again in the rest is "
+        "apart, or has no pose\n",
+        summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
+        summary.pieces_cut == 1 ? "is" : "are");
   }
   for (const PathLeap& leap : summary.leaps) {
     fmt::print(

@@ -154,9 +154,9 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
   summary.frames_tracked = system.LiveFrameCount();
   const Trajectory path = system.FrameTrajectory();
   summary.frames_backfilled = path.size() - summary.frames_tracked;
-  for (const PartId part : system.Parts())
-    summary.frames_in_other_maps += system.FrameTrajectory(part).size();
-  summary.frames_in_other_maps -= path.size();
+  const std::vector<PartId> parts = system.Parts();
+  for (size_t i = 1; i < parts.size(); ++i)
+    summary.frames_in_other_maps += system.FrameTrajectory(parts[i]).size();
   summary.pieces_cut = system.PiecesCut();
   summary.leaps = FindLeaps(path);
   {

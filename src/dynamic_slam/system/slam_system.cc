@@ -19,9 +19,6 @@
 namespace dynamic_slam {
 namespace {
 
-// Of the frames of a part, so many must be found in another before it is given up for that.
-constexpr double kNearlyAll = 0.75;
-
 // Longer parts, ten seconds, have a scale of their own; to try takes as long as to track them.
 constexpr size_t kMostGrownOver = 300;
 
@@ -303,9 +300,11 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   }
 }
 
-std::vector<AnchoredPose> SlamSystem::LookAgainFor(const std::set<double>& stamps) {
-  refiner_->ForEachOf(
-      stamps, [this](const Frame& frame, int min_inliers) { backfiller_->Keep(frame, min_inliers, false); });
+std::vector<AnchoredPose> SlamSystem::LookAgainFor(const std::set<double>& stamps,
+                                                   Backfiller* backfiller) const {
+  refiner_->ForEachOf(stamps, [backfiller](const Frame& frame, int min_inliers) {
+    backfiller->Keep(frame, min_inliers, false);
+  });
   std::vector<AnchoredPose> others = tracked_.Poses();
   std::erase_if(others, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
   return others;
@@ -315,25 +314,22 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
   for (const PartId part : tracked_.Parts()) {
     if (should_stop && should_stop()) return;
     const PartId main = tracked_.Parts().front();
+    if (part == main || IsFromFile(*map_.Read(), part)) continue;
     std::set<double> stamps;
     for (const StampedPose& pose : tracked_.PathOf(part)) stamps.insert(pose.timestamp_s);
-    if (part == main || stamps.empty() || stamps.size() > kMostGrownOver || IsFromFile(*map_.Read(), part))
-      continue;
+    if (stamps.empty() || stamps.size() > kMostGrownOver) continue;
     // For a trial, as most of what nothing joined is elsewhere.
     Map map = *map_.Read();
     const MappingReport report = *mapping_report_.Read();
-    std::vector<AnchoredPose> known = LookAgainFor(stamps), found;
+    std::vector<AnchoredPose> known = LookAgainFor(stamps, &*backfiller_), found;
     map_.Write()->ErasePart(part);
     for (const bool grows : {true, false}) {
       const std::vector<AnchoredPose> now = Backfill(known, grows, should_stop);
       known.insert(known.end(), now.begin(), now.end());
       found.insert(found.end(), now.begin(), now.end());
     }
-    size_t count = 0;
-    for (const AnchoredPose& pose : found)
-      count += stamps.contains(pose.timestamp_s) && map_.Read()->PartOf(pose.reference) == main;
     const bool is_whole = !should_stop || !should_stop();
-    if (is_whole && static_cast<double>(count) >= kNearlyAll * static_cast<double>(stamps.size())) {
+    if (is_whole && tracked_.HasNearlyAll(main, stamps, found)) {
       tracked_.RemoveThoseOfErasedParts();
       tracked_.AddFound(found);
       DrainMapping();
@@ -346,15 +342,19 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
 }
 
 void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
+  if (!tracked_.Leaps()) return;
   CutWrong(tracked_.PiecesAtLeaps(), should_stop);
   for (const double within_s : kEnds_s) {
     for (const bool is_before : {true, false}) {
       // Each alone, as they may overlap; the leap of one that was cut off is gone.
+      std::vector<TrackedFrames::Piece> ends = tracked_.EndsAtLeaps(within_s, is_before);
       size_t next = 0;
-      for (size_t left = tracked_.EndsAtLeaps(within_s, is_before).size(); left > 0; --left) {
-        const std::vector<TrackedFrames::Piece> ends = tracked_.EndsAtLeaps(within_s, is_before);
-        if (next >= ends.size()) break;
-        next += CutWrong({&ends[next], 1}, should_stop) ? 0 : 1;
+      for (size_t left = ends.size(); left > 0 && next < ends.size(); --left) {
+        if (CutWrong({&ends[next], 1}, should_stop)) {
+          ends = tracked_.EndsAtLeaps(within_s, is_before);
+        } else {
+          ++next;
+        }
       }
     }
   }
@@ -371,7 +371,9 @@ bool SlamSystem::CutWrong(std::span<const TrackedFrames::Piece> pieces,
   Map map = *map_.Read();
   const std::vector<AnchoredPose> poses = tracked_.Poses();
   for (const PartId part : tracked_.CutOff(pieces)) map_.Write()->ErasePart(part);
-  std::vector<AnchoredPose> found = Backfill(LookAgainFor(stamps), false, should_stop);
+  Backfiller backfiller(camera(), options_.tracker, options_.seed, &map_);
+  const std::vector<AnchoredPose> others = LookAgainFor(stamps, &backfiller);
+  std::vector<AnchoredPose> found = backfiller.Find(others, should_stop);
   const bool is_whole = !should_stop || !should_stop();
   std::vector<TrackedFrames::Piece> wrong;
   for (const TrackedFrames::Piece& piece : pieces) {

@@ -163,8 +163,8 @@ class SlamSystem {
   void CutWrongPieces(const std::function<bool()>& should_stop);
   // Whether any of these was cut off.
   bool CutWrong(std::span<const TrackedFrames::Piece> pieces, const std::function<bool()>& should_stop);
-  // Frames that are looked for again, as if they had no pose. Returns the poses of all others.
-  std::vector<AnchoredPose> LookAgainFor(const std::set<double>& stamps);
+  // Frames that `backfiller` is to look for, as if they had no pose. Returns the poses of all others.
+  std::vector<AnchoredPose> LookAgainFor(const std::set<double>& stamps, Backfiller* backfiller) const;
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops

@@ -84,6 +84,12 @@ void TrackedFrames::Replace(std::span<const AnchoredPose> poses) {
   frames_.Assign(all);
 }
 
+bool TrackedFrames::Leaps() const {
+  const std::vector<PartId> parts = Parts();
+  return std::any_of(parts.begin(), parts.end(),
+                     [this](PartId part) { return !FindLeaps(Smoothed(PathOf(part))).empty(); });
+}
+
 std::vector<TrackedFrames::Piece> TrackedFrames::PiecesAtLeaps() const {
   std::vector<Piece> pieces;
   for (const PartId part : Parts()) {
@@ -178,6 +184,15 @@ bool TrackedFrames::IsWrong(const Piece& piece, std::span<const AnchoredPose> fo
     }
   }
   return piece.is_end ? IsMended(piece, now) : IsElsewhere(piece, now);
+}
+
+bool TrackedFrames::HasNearlyAll(PartId part, const std::set<double>& stamps,
+                                 std::span<const AnchoredPose> found) const {
+  const auto map = map_->Read();
+  const auto count = std::count_if(found.begin(), found.end(), [&](const AnchoredPose& pose) {
+    return stamps.contains(pose.timestamp_s) && map->PartOf(pose.reference) == part;
+  });
+  return static_cast<double>(count) >= kNearlyAll * static_cast<double>(stamps.size());
 }
 
 bool TrackedFrames::IsElsewhere(const Piece& piece, const Trajectory& found) const {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -41,6 +42,8 @@ class TrackedFrames {
   void Replace(std::span<const AnchoredPose> poses);
   void Clear() { frames_.clear(); }
 
+  bool Leaps() const;
+
   // Where the path of a part leaps, which the camera cannot have done, either that part does not fit together
   // or the film has a cut. If nearly all of it is on one side of every leap: what is on the other.
   std::vector<Piece> PiecesAtLeaps() const;
@@ -57,6 +60,9 @@ class TrackedFrames {
   // side of a leap: of a quarter of its frames or more, and most of these are farther away than the camera
   // moves from one frame to the next. An end: of nearly all, and with them the path leaps there no more.
   bool IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const;
+
+  // Whether nearly all frames of these stamps were found in the part.
+  bool HasNearlyAll(PartId part, const std::set<double>& stamps, std::span<const AnchoredPose> found) const;
 
   // The path of each part becomes what is most probable (SmoothPath). `should_stop` may be empty.
   void Smooth(const std::function<bool()>& should_stop);
