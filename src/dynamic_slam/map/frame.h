@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "dynamic_slam/base/ids.h"
 #include "dynamic_slam/features/features.h"
@@ -59,6 +62,19 @@ struct AnchoredPose {
   double timestamp_s = 0;
   KeyframeId reference;
   Rigid3 cam_from_reference;  // lengths are in the reference's unit (Keyframe::unit)
+};
+
+// What a frame that is no keyframe sees of the map.
+struct FrameView {
+  struct Sighting {
+    LandmarkId landmark;
+    Eigen::Vector2f ideal_px;
+    int32_t octave = 0;
+    float static_probability = 1;
+  };
+  double timestamp_s = 0;
+  Rigid3 cam_from_world;
+  std::vector<Sighting> sightings;
 };
 
 class Map;

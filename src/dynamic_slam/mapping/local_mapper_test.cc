@@ -257,6 +257,41 @@ TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
 }
 
+// Keyframes at the ends of a way share too little to tell their distance well; frames between them see both.
+TEST(MapBundleTest, FramesThatSeeTheMapTellWhereItIs) {
+  SyntheticWorld world(400, 0.5);
+  const auto error_with = [&world](bool with_views) {
+    SyntheticMap scene(&world);
+    std::vector<KeyframeId> ids;
+    for (const double x : {0.0, 0.2, 0.4}) ids.push_back(scene.Add(SidewaysPose(x)));
+    scene.AddLandmarks(0, 399, ids);
+    std::vector<LandmarkId> landmark_of(world.size());
+    const auto& points = scene.views[0].points;
+    for (size_t i = 0; i < points.size(); ++i)
+      landmark_of[points[i]] = scene.map.keyframes().At(ids[0]).landmarks()[i];
+    std::vector<FrameView> views;
+    for (int i = 1; with_views && i < 20; ++i) {
+      if (i % 10 == 0) continue;
+      const SyntheticView seen = world.See(SidewaysPose(0.02 * i));
+      FrameView view{100.0 + i, SidewaysPose(0.02 * i + 0.005), {}};
+      for (size_t k = 0; k < seen.points.size(); ++k) {
+        const LandmarkId landmark = landmark_of[seen.points[k]];
+        const Keypoint& keypoint = seen.frame.features.keypoints[k];
+        if (landmark.IsValid())
+          view.sightings.push_back({landmark, {keypoint.x, keypoint.y}, keypoint.octave, 1});
+      }
+      views.push_back(view);
+    }
+    EXPECT_TRUE(AdjustAll(world.camera(), {}, {}, &scene.shared_map, views).usable);
+    EXPECT_THAT(scene.map.Validate(), IsEmpty());
+    const auto centre = [&](size_t i) { return scene.map.keyframes().At(ids[i]).CenterInWorld(); };
+    // The scale is free: halfway is halfway.
+    return (centre(1) - 0.5 * (centre(0) + centre(2))).norm() / (centre(2) - centre(0)).norm();
+  };
+  const double with_views = error_with(true), without = error_with(false);
+  EXPECT_LT(with_views, 0.7 * without) << without;
+}
+
 TEST(MapBundleTest, WhatCameMeanwhileMovesAlong) {
   SyntheticWorld world(400);
   SyntheticMap scene(&world);
@@ -297,8 +332,8 @@ struct PlaceMappedTwice {
   PlaceMappedTwice() {
     for (int i = 0; i < 8; ++i) ids.push_back(scene.Add(SidewaysPose(0.1 * (i % 4))));
     scene.AddLandmarks(0, kPoints / 2, ids);
-    for (const std::vector<KeyframeId>& visit : {std::vector(ids.begin(), ids.begin() + 4),
-                                                 std::vector(ids.begin() + 4, ids.end())})
+    for (const std::vector<KeyframeId>& visit :
+         {std::vector(ids.begin(), ids.begin() + 4), std::vector(ids.begin() + 4, ids.end())})
       scene.AddLandmarks(kPoints / 2, kPoints, visit);
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "dynamic_slam/base/trace.h"
@@ -22,7 +23,7 @@ class MapBundle {
       : epoch_(map.epoch()),
         revision_(map.revision()),
         pose_of_(map.keyframes().CreatedCount(), kNone),
-        seen_(map.landmarks().CreatedCount(), false) {}
+        point_of_(map.landmarks().CreatedCount(), kNone) {}
 
   // Of everything: all that others compute from the map meanwhile is out of date when it ends.
   void SetWhole() { is_whole_ = true; }
@@ -35,8 +36,9 @@ class MapBundle {
 
   void AddLandmarksOf(const Map& map, KeyframeId id) {
     map.keyframes().At(id).ForEachLandmark([&](uint32_t, LandmarkId landmark) {
-      if (seen_[landmark.value()]) return;
-      seen_[landmark.value()] = true;
+      uint32_t& point = point_of_[landmark.value()];
+      if (point != kNone) return;
+      point = static_cast<uint32_t>(landmarks_.size());
       landmarks_.push_back(landmark);
     });
   }
@@ -46,19 +48,31 @@ class MapBundle {
   void AddObservations(const Map& map) {
     for (const LandmarkId id : landmarks_) {
       const Landmark& landmark = map.landmarks().At(id);
-      const uint32_t point = static_cast<uint32_t>(problem_.points.size());
       problem_.points.push_back({landmark.position(), false});
       for (const Observation& observation : landmark.observations()) {
         if (!HasPose(observation.keyframe)) continue;
         const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
         const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
-        problem_.observations.push_back(
-            {pose_of_[observation.keyframe.value()],
-             point,
-             {keypoint.x, keypoint.y},
-             1.0 / map.octave_scales()[static_cast<size_t>(keypoint.octave)],
-             TrustInMatch(keyframe.StaticProbability(observation.keypoint), landmark.static_log_odds)});
+        Observe(map, pose_of_[observation.keyframe.value()],
+                {id,
+                 {keypoint.x, keypoint.y},
+                 keypoint.octave,
+                 keyframe.StaticProbability(observation.keypoint)});
         links_.push_back({observation, id});
+      }
+    }
+  }
+
+  // After them: where keyframes are not.
+  void AddViews(const Map& map, std::span<const FrameView> views) {
+    std::set<double> stamps;
+    map.keyframes().ForEach([&](const Keyframe& keyframe) { stamps.insert(keyframe.timestamp_s()); });
+    for (const FrameView& view : views) {
+      if (stamps.contains(view.timestamp_s)) continue;
+      const uint32_t pose = static_cast<uint32_t>(problem_.poses.size());
+      problem_.poses.push_back({view.cam_from_world, false});
+      for (const FrameView::Sighting& sighting : view.sightings) {
+        if (map.landmarks().Contains(sighting.landmark)) Observe(map, pose, sighting);
       }
     }
   }
@@ -88,7 +102,14 @@ class MapBundle {
   }
 
  private:
-  // Of the problem's observations, those of a landmark one after the other.
+  void Observe(const Map& map, uint32_t pose, const FrameView::Sighting& sighting) {
+    problem_.observations.push_back(
+        {pose, point_of_[sighting.landmark.value()], sighting.ideal_px.cast<double>(),
+         1.0 / map.octave_scales()[static_cast<size_t>(sighting.octave)],
+         TrustInMatch(sighting.static_probability, map.landmarks().At(sighting.landmark).static_log_odds)});
+  }
+
+  // Of the problem's first observations, those of a landmark one after the other.
   struct Link {
     Observation observation;
     LandmarkId landmark;
@@ -126,7 +147,7 @@ class MapBundle {
 
   std::vector<Younger> YoungerLandmarks(const Map& map) const {
     std::vector<Younger> younger;
-    for (uint32_t id = static_cast<uint32_t>(seen_.size()); id < map.landmarks().CreatedCount(); ++id) {
+    for (uint32_t id = static_cast<uint32_t>(point_of_.size()); id < map.landmarks().CreatedCount(); ++id) {
       const Landmark* landmark = map.landmarks().Find(LandmarkId(id));
       if (landmark == nullptr || landmark->observations().empty()) continue;
       const KeyframeId seen_by = landmark->observations().back().keyframe;
@@ -164,8 +185,8 @@ class MapBundle {
   bool is_whole_ = false;
   BundleProblem problem_;
   std::vector<uint8_t> is_outlier_;
-  std::vector<uint32_t> pose_of_;  // by keyframe id
-  std::vector<bool> seen_;         // by landmark id
+  std::vector<uint32_t> pose_of_;   // by keyframe id
+  std::vector<uint32_t> point_of_;  // by landmark id
   std::vector<KeyframeId> keyframes_;
   std::vector<LandmarkId> landmarks_;
   std::vector<Link> links_;
@@ -241,13 +262,15 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 }
 
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
-                        const std::function<bool()>& should_stop, SharedMap* map) {
+                        const std::function<bool()>& should_stop, SharedMap* map,
+                        std::span<const FrameView> views) {
   DS_TRACE("mapping/adjust all");
   std::optional<MapBundle> bundle;
   {
     const auto locked = map->Read();
     if (locked->keyframes().size() < 2) return {};
     bundle = WholeBundle(*locked);
+    bundle->AddViews(*locked, views);
   }
   return SolveAndWriteBack(camera, options.final_bundle, should_stop, &*bundle, map);
 }

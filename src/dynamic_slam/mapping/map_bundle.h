@@ -1,8 +1,10 @@
 #pragma once
 
 #include <functional>
+#include <span>
 
 #include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
@@ -18,8 +20,10 @@ namespace dynamic_slam {
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
                           uint32_t epoch, const std::function<bool()>& should_stop, SharedMap* map);
 
-// The same of the whole map, the origin of each part fixed.
+// The same of the whole map, the origin of each part fixed. Frames that see it help to tell where it is: of
+// those, only what they say of keyframes and landmarks is written back.
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
-                        const std::function<bool()>& should_stop, SharedMap* map);
+                        const std::function<bool()>& should_stop, SharedMap* map,
+                        std::span<const FrameView> views = {});
 
 }  // namespace dynamic_slam

@@ -15,6 +15,7 @@
 #include "dynamic_slam/base/thread_priority.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/map_bundle.h"
+#include "dynamic_slam/system/leap_mender.h"
 
 namespace dynamic_slam {
 namespace {
@@ -22,9 +23,9 @@ namespace {
 // Longer parts, ten seconds, have a scale of their own; to try takes as long as to track them.
 constexpr size_t kMostGrownOver = 300;
 
-// So long before or after a leap tracking may have gone astray: the longest first, as the path comes back
-// within a frame or two of which that would be mended alone.
-constexpr double kEnds_s[] = {2.0 / 3, 1.0 / 3, 1.0 / 6};
+// So often the map is adjusted to what frames see of it: then they see more. Crowd 22 errs by 0.0125 m
+// without, by 0.0110, 0.0103, 0.0099 after one, two, three.
+constexpr int kViewRounds = 2;
 
 double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -263,8 +264,14 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
   const bool adjusts = options_.final_bundle && changes_map;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) tracked_.AddFound(Backfill(tracked_.Poses(), false, should_stop));
-  if (refiner_.has_value() && changes_map) tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
-  if (changes_map && refiner_.has_value() && backfiller_.has_value()) CutWrongPieces(should_stop);
+  if (refiner_.has_value() && changes_map) {
+    RefinePath(adjusts, should_stop);
+    // Without the frames between nobody knows whether the path leaps.
+    if (backfiller_.has_value()) {
+      LeapMender mender(camera(), options_.tracker, options_.seed, *refiner_, &tracked_, &map_);
+      pieces_cut_ = mender.CutOffSides(should_stop) + mender.MendEnds(should_stop);
+    }
+  }
   if (mode_ == RunMode::kOffline && options_.smooth_path) tracked_.Smooth(should_stop);
   return bundle;
 }
@@ -300,16 +307,6 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   }
 }
 
-std::vector<AnchoredPose> SlamSystem::LookAgainFor(const std::set<double>& stamps,
-                                                   Backfiller* backfiller) const {
-  refiner_->ForEachOf(stamps, [backfiller](const Frame& frame, int min_inliers) {
-    backfiller->Keep(frame, min_inliers, false);
-  });
-  std::vector<AnchoredPose> others = tracked_.Poses();
-  std::erase_if(others, [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
-  return others;
-}
-
 void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
   for (const PartId part : tracked_.Parts()) {
     if (should_stop && should_stop()) return;
@@ -321,7 +318,8 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
     // For a trial, as most of what nothing joined is elsewhere.
     Map map = *map_.Read();
     const MappingReport report = *mapping_report_.Read();
-    std::vector<AnchoredPose> known = LookAgainFor(stamps, &*backfiller_), found;
+    refiner_->GiveTo(&*backfiller_, stamps);
+    std::vector<AnchoredPose> known = tracked_.PosesBut(stamps), found;
     map_.Write()->ErasePart(part);
     for (const bool grows : {true, false}) {
       const std::vector<AnchoredPose> now = Backfill(known, grows, should_stop);
@@ -341,66 +339,13 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
   }
 }
 
-void SlamSystem::CutWrongPieces(const std::function<bool()>& should_stop) {
-  if (!tracked_.Leaps()) return;
-  CutWrong(tracked_.PiecesAtLeaps(), should_stop);
-  for (const double within_s : kEnds_s) {
-    for (const bool is_before : {true, false}) {
-      // Each alone, as they may overlap; the leap of one that was cut off is gone.
-      std::vector<TrackedFrames::Piece> ends = tracked_.EndsAtLeaps(within_s, is_before);
-      size_t next = 0;
-      for (size_t left = ends.size(); left > 0 && next < ends.size(); --left) {
-        if (CutWrong({&ends[next], 1}, should_stop)) {
-          ends = tracked_.EndsAtLeaps(within_s, is_before);
-        } else {
-          ++next;
-        }
-      }
-    }
+void SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& should_stop) {
+  for (int round = 0; adjusts_map && round < kViewRounds; ++round) {
+    std::vector<FrameView> views;
+    tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views));
+    if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, views).usable) break;
   }
-}
-
-bool SlamSystem::CutWrong(std::span<const TrackedFrames::Piece> pieces,
-                          const std::function<bool()>& should_stop) {
-  if (pieces.empty() || (should_stop && should_stop())) return false;
-  std::set<double> stamps;
-  for (const TrackedFrames::Piece& piece : pieces) {
-    for (const auto& [timestamp_s, centre] : piece.centres) stamps.insert(timestamp_s);
-  }
-  // For a trial, as a film with a cut leaps too.
-  Map map = *map_.Read();
-  const std::vector<AnchoredPose> poses = tracked_.Poses();
-  for (const PartId part : tracked_.CutOff(pieces)) map_.Write()->ErasePart(part);
-  Backfiller backfiller(camera(), options_.tracker, options_.seed, &map_);
-  const std::vector<AnchoredPose> others = LookAgainFor(stamps, &backfiller);
-  std::vector<AnchoredPose> found = backfiller.Find(others, should_stop);
-  const bool is_whole = !should_stop || !should_stop();
-  std::vector<TrackedFrames::Piece> wrong;
-  for (const TrackedFrames::Piece& piece : pieces) {
-    if (is_whole && tracked_.IsWrong(piece, found)) wrong.push_back(piece);
-  }
-  map_.Write()->Replace(std::move(map));
-  tracked_.Replace(poses);
-
-  if (wrong.empty()) return false;
-  std::erase_if(found, [&](const AnchoredPose& pose) {
-    return std::none_of(wrong.begin(), wrong.end(), [&](const TrackedFrames::Piece& piece) {
-      return piece.centres.contains(pose.timestamp_s);
-    });
-  });
-  pieces_cut_ += static_cast<int>(wrong.size());
-  const std::vector<PartId> parts = tracked_.CutOff(wrong);
-  // What is not found of an end went astray; a whole side may be right in itself.
-  for (const TrackedFrames::Piece& piece : wrong) {
-    if (piece.is_end) tracked_.Remove(piece);
-  }
-  tracked_.AddFound(found);
-  const std::vector<PartId> with_frames = tracked_.Parts();
-  for (const PartId part : parts) {
-    if (std::find(with_frames.begin(), with_frames.end(), part) == with_frames.end())
-      map_.Write()->ErasePart(part);
-  }
-  return true;
+  tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {

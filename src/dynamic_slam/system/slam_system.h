@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <set>
 #include <span>
 #include <vector>
 
@@ -157,14 +156,9 @@ class SlamSystem {
   void CloseBorders(const std::function<bool()>& should_stop);
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
-  // Pieces of the path from which the camera cannot have come, and whose frames the rest of the map has
-  // elsewhere, become parts of their own; those frames get their pose in the rest. Of ends that went astray
-  // frames that are not found have none any more.
-  void CutWrongPieces(const std::function<bool()>& should_stop);
-  // Whether any of these was cut off.
-  bool CutWrong(std::span<const TrackedFrames::Piece> pieces, const std::function<bool()>& should_stop);
-  // Frames that `backfiller` is to look for, as if they had no pose. Returns the poses of all others.
-  std::vector<AnchoredPose> LookAgainFor(const std::set<double>& stamps, Backfiller* backfiller) const;
+  // Tracks frames once more in the finished map; adjusts_map: and again when that is adjusted to what they
+  // see.
+  void RefinePath(bool adjusts_map, const std::function<bool()>& should_stop);
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops

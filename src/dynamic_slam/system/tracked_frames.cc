@@ -55,9 +55,12 @@ void TrackedFrames::RemoveThoseOfErasedParts() {
   frames_.Assign(left);
 }
 
-void TrackedFrames::Remove(const Piece& piece) {
+void TrackedFrames::RemoveAllBut(std::span<const AnchoredPose> found, const Piece& piece) {
+  std::set<double> stamps;
+  for (const auto& [timestamp_s, centre] : piece.centres) stamps.insert(timestamp_s);
+  for (const AnchoredPose& pose : found) stamps.erase(pose.timestamp_s);
   std::vector<TrackedFrame> left = All();
-  std::erase_if(left, [&](const TrackedFrame& frame) { return piece.centres.contains(frame.timestamp_s); });
+  std::erase_if(left, [&](const TrackedFrame& frame) { return stamps.contains(frame.timestamp_s); });
   frames_.Assign(left);
 }
 
@@ -241,6 +244,12 @@ void TrackedFrames::Smooth(const std::function<bool()>& should_stop) {
 std::vector<AnchoredPose> TrackedFrames::Poses() const {
   std::vector<AnchoredPose> poses;
   for (const TrackedFrame& frame : frames_) poses.push_back(frame.Pose());
+  return poses;
+}
+
+std::vector<AnchoredPose> TrackedFrames::PosesBut(const std::set<double>& stamps) const {
+  std::vector<AnchoredPose> poses = Poses();
+  std::erase_if(poses, [&stamps](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); });
   return poses;
 }
 

@@ -35,7 +35,8 @@ class TrackedFrames {
   void Add(const AnchoredPose& pose, bool is_live) { frames_.push_back(TrackedFrame(pose, is_live)); }
   void RemoveLast() { frames_.pop_back(); }
   void RemoveThoseOfErasedParts();
-  void Remove(const Piece& piece);
+  // Frames of the piece that are not among these.
+  void RemoveAllBut(std::span<const AnchoredPose> found, const Piece& piece);
   // In any order: frames that had none, or one that is given up.
   void AddFound(std::span<const AnchoredPose> poses);
   // Poses of frames that have one, in any order, instead.
@@ -68,6 +69,7 @@ class TrackedFrames {
   void Smooth(const std::function<bool()>& should_stop);
 
   std::vector<AnchoredPose> Poses() const;
+  std::vector<AnchoredPose> PosesBut(const std::set<double>& stamps) const;
   // The parts that have frames: the one with the most first.
   std::vector<PartId> Parts() const;
   Trajectory PathOf(PartId part) const;

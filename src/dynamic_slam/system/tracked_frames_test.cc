@@ -149,10 +149,13 @@ TEST_F(TrackedFramesTest, AnEndAtALeapIsWrongWhereThePathLeapsNoMoreWithoutIt) {
   EXPECT_FALSE(tracked_.IsWrong(end, found(4, 0))) << "too many of them would have no pose";
   EXPECT_FALSE(tracked_.IsWrong(end, found(0, kAway))) << "it leaps as before";
   EXPECT_FALSE(tracked_.IsWrong(end, {}));
-  const size_t frames = tracked_.PathOf(PartId(0)).size();
-  tracked_.Remove(end);
+  const size_t frames = tracked_.PathOf(PartId(0)).size(), live = tracked_.LiveCountOf(PartId(0));
+  const std::vector<AnchoredPose> mended = found(2, 0);
+  tracked_.RemoveAllBut(mended, end);
+  tracked_.Replace(mended);
   EXPECT_THAT(tracked_.Parts(), SizeIs(1)) << "none is left on the part that was cut off";
-  EXPECT_EQ(tracked_.PathOf(PartId(0)).size(), frames);
+  EXPECT_EQ(tracked_.PathOf(PartId(0)).size(), frames + mended.size());
+  EXPECT_EQ(tracked_.LiveCountOf(PartId(0)), live + mended.size()) << "tracked then, and once more now";
 }
 
 TEST_F(TrackedFramesTest, OfTwoHalvesNobodyCanTellWhichStandsWrong) {

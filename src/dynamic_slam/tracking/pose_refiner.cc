@@ -14,6 +14,21 @@ constexpr size_t kMaxKeypoints = 8'000'000;
 // With so many times the inliers that it needs a pose is not in doubt.
 constexpr double kNoDoubt = 2;
 
+// A frame sees of the map what the next one sees. With every frame, crowd 22 errs by 0.0102 m, with every
+// third by 0.0110, with keyframes only by 0.0125; the time grows with the square.
+constexpr size_t kViewEvery = 3;
+
+FrameView ViewOf(const Frame& frame) {
+  FrameView view{frame.timestamp_s, frame.cam_from_world, {}};
+  for (size_t i = 0; i < frame.landmarks.size(); ++i) {
+    const Keypoint& keypoint = frame.features.keypoints[i];
+    if (!frame.landmarks[i].IsValid()) continue;
+    view.sightings.push_back(
+        {frame.landmarks[i], {keypoint.x, keypoint.y}, keypoint.octave, frame.StaticProbability(i)});
+  }
+  return view;
+}
+
 }  // namespace
 
 PoseRefiner::PoseRefiner(const Camera& camera, const TrackerOptions& options, SharedMap* map)
@@ -31,20 +46,24 @@ void PoseRefiner::Keep(const Frame& frame, int min_inliers) {
 }
 
 std::vector<AnchoredPose> PoseRefiner::Refine(std::span<const AnchoredPose> known,
-                                              const std::function<bool()>& should_stop) {
+                                              const std::function<bool()>& should_stop,
+                                              std::vector<FrameView>* views) {
   DS_TRACE("refine");
   const KnownPoses before(known, map_);
   std::vector<Refined> refined(frames_.size());
-  for (const bool is_forward : {true, false}) Pass(is_forward, before, should_stop, &refined);
+  for (const bool is_forward : {true, false})
+    Pass(is_forward, before, views != nullptr, should_stop, &refined);
   std::vector<AnchoredPose> found;
-  for (const Refined& frame : refined) {
-    if (frame.pose.has_value()) found.push_back(*frame.pose);
+  for (Refined& frame : refined) {
+    if (!frame.pose.has_value()) continue;
+    found.push_back(*frame.pose);
+    if (!frame.view.sightings.empty()) views->push_back(std::move(frame.view));
   }
   return found;
 }
 
-void PoseRefiner::Pass(bool is_forward, const KnownPoses& known, const std::function<bool()>& should_stop,
-                       std::vector<Refined>* refined) {
+void PoseRefiner::Pass(bool is_forward, const KnownPoses& known, bool with_views,
+                       const std::function<bool()>& should_stop, std::vector<Refined>* refined) {
   KnownPoses passed = known;
   for (const KeptFrame& kept : frames_) passed.Forget(kept.timestamp_s);
   for (size_t k = 0; k < frames_.size(); ++k) {
@@ -67,14 +86,14 @@ void PoseRefiner::Pass(bool is_forward, const KnownPoses& known, const std::func
                              map->PoseFromReference(before.reference, before.cam_from_reference)});
         }
       }
-      Track(kept, guesses, passed, &frame);
+      Track(kept, guesses, passed, with_views && i % kViewEvery == 0, &frame);
     }
     if (frame.pose.has_value()) passed.Add(*frame.pose);
   }
 }
 
 void PoseRefiner::Track(const KeptFrame& kept, std::span<const KnownPoses::Guess> guesses,
-                        const KnownPoses& others, Refined* refined) {
+                        const KnownPoses& others, bool with_view, Refined* refined) {
   if (guesses.empty()) return;
   Frame frame = Restore(kept);
   for (const KnownPoses::Guess& guess : guesses) {
@@ -82,7 +101,7 @@ void PoseRefiner::Track(const KeptFrame& kept, std::span<const KnownPoses::Guess
     const double right = finder_.localiser().pose_tracker().RightInliers();
     const std::optional<AnchoredPose> pose = finder_.PlausiblePose(others, &frame);
     if (!pose.has_value()) continue;
-    if (right > refined->right_inliers) *refined = {pose, right};
+    if (right > refined->right_inliers) *refined = {pose, right, with_view ? ViewOf(frame) : FrameView()};
     return;
   }
 }
@@ -100,10 +119,9 @@ Frame PoseRefiner::Restore(const KeptFrame& kept) const {
   return finder_.MakeFrame(kept.id, kept.timestamp_s, std::move(features), std::move(static_probability));
 }
 
-void PoseRefiner::ForEachOf(const std::set<double>& stamps,
-                            const std::function<void(const Frame&, int)>& fn) const {
+void PoseRefiner::GiveTo(Backfiller* backfiller, const std::set<double>& stamps) const {
   for (const KeptFrame& kept : frames_) {
-    if (stamps.contains(kept.timestamp_s)) fn(Restore(kept), kept.min_inliers);
+    if (stamps.contains(kept.timestamp_s)) backfiller->Keep(Restore(kept), kept.min_inliers, false);
   }
 }
 

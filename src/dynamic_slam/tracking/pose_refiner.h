@@ -10,6 +10,7 @@
 #include "dynamic_slam/base/file_backed_vector.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/tracking/backfiller.h"
 #include "dynamic_slam/tracking/frame_finder.h"
 
 namespace dynamic_slam {
@@ -26,13 +27,14 @@ class PoseRefiner {
 
   // The poses that are found for those frames that have one in `known`, each in the part of the map where
   // that is: from the frames before or else from the pose that is known, and where that leaves doubt from the
-  // frames after. `should_stop` may be empty; when it says so, that is all.
+  // frames after. `should_stop` may be empty; when it says so, that is all. views: gets what every third
+  // frame sees of the map at its new pose, if not null.
   std::vector<AnchoredPose> Refine(std::span<const AnchoredPose> known,
-                                   const std::function<bool()>& should_stop);
+                                   const std::function<bool()>& should_stop,
+                                   std::vector<FrameView>* views = nullptr);
 
-  // Calls fn(frame, min_inliers) for the frames that were kept of these stamps, in the order of time, as they
-  // were found: without a pose.
-  void ForEachOf(const std::set<double>& stamps, const std::function<void(const Frame&, int)>& fn) const;
+  // The backfiller keeps the frames of these stamps too, as if they had no pose.
+  void GiveTo(Backfiller* backfiller, const std::set<double>& stamps) const;
 
   void Clear();
 
@@ -52,14 +54,15 @@ class PoseRefiner {
   struct Refined {
     std::optional<AnchoredPose> pose;
     double right_inliers = 0;
+    FrameView view;  // if it is asked for
   };
 
   // In the order of time or against it: tracks the frames that are in doubt from those that it came by,
   // and those that are known and not kept.
-  void Pass(bool is_forward, const KnownPoses& known, const std::function<bool()>& should_stop,
-            std::vector<Refined>* refined);
+  void Pass(bool is_forward, const KnownPoses& known, bool with_views,
+            const std::function<bool()>& should_stop, std::vector<Refined>* refined);
   void Track(const KeptFrame& kept, std::span<const KnownPoses::Guess> guesses, const KnownPoses& others,
-             Refined* refined);
+             bool with_view, Refined* refined);
   Frame Restore(const KeptFrame& kept) const;
 
   SharedMap* map_;

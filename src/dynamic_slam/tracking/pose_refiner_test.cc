@@ -86,6 +86,36 @@ TEST_F(PoseRefinerTest, KeypointsOfMoversAreNotLookedAt) {
   EXPECT_THAT(refiner_.Refine(known_, {}), IsEmpty());
 }
 
+TEST_F(PoseRefinerTest, ViewsAreWhatEveryThirdFrameSeesOfTheMap) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i), i == 3 ? 10000 : kMinInliers);
+  std::vector<FrameView> views;
+  refiner_.Refine(known_, {}, &views);
+  ASSERT_THAT(views, SizeIs(10)) << "of 0, 6, 9, ..., 30: frame 3 has no pose";
+  for (const FrameView& view : views) {
+    const double centre = view.cam_from_world.TargetOriginInSource().x();
+    EXPECT_NEAR(centre, view.timestamp_s, 0.005);
+    EXPECT_GE(view.sightings.size(), static_cast<size_t>(kMinInliers));
+    for (const FrameView::Sighting& sighting : view.sightings) {
+      const Landmark& landmark = scene_.map.landmarks().At(sighting.landmark);
+      const Eigen::Vector2d at = world_.camera().Project(view.cam_from_world * landmark.position());
+      const double scale = SyntheticWorld::OctaveScales()[static_cast<size_t>(sighting.octave)];
+      EXPECT_LT((at - sighting.ideal_px.cast<double>()).norm(), 2.5 * scale) << "inliers: 95% of what fits";
+    }
+  }
+}
+
+TEST_F(PoseRefinerTest, GivesFramesAwayAsIfTheyHadNoPose) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i));
+  Backfiller backfiller(world_.camera(), TrackerOptions(), 1, &scene_.shared_map);
+  refiner_.GiveTo(&backfiller, {StampOf(10), StampOf(11)});
+  std::erase_if(known_, [](const AnchoredPose& pose) {
+    return pose.timestamp_s == StampOf(10) || pose.timestamp_s == StampOf(11);
+  });
+  const std::vector<AnchoredPose> found = backfiller.Find(known_, {});
+  ASSERT_THAT(found, SizeIs(2));
+  for (const AnchoredPose& pose : found) EXPECT_LT(ErrorOf(pose), 0.005);
+}
+
 TEST_F(PoseRefinerTest, StopsWhenItIsToldAndForgetsWhenCleared) {
   for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i));
   int asked = 0;
