@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "dynamic_slam/base/trace.h"
@@ -63,12 +62,9 @@ class MapBundle {
     }
   }
 
-  // After them: where keyframes are not.
+  // After them.
   void AddViews(const Map& map, std::span<const FrameView> views) {
-    std::set<double> stamps;
-    map.keyframes().ForEach([&](const Keyframe& keyframe) { stamps.insert(keyframe.timestamp_s()); });
     for (const FrameView& view : views) {
-      if (stamps.contains(view.timestamp_s)) continue;
       const uint32_t pose = static_cast<uint32_t>(problem_.poses.size());
       problem_.poses.push_back({view.cam_from_world, false});
       for (const FrameView::Sighting& sighting : view.sightings) {

@@ -46,7 +46,7 @@ struct SystemOptions {
     visit("refine_poses", self.refine_poses,
           OptionField{"", 0, 1,
                       "Offline: frames are tracked once more in the finished map, which knows more than when "
-                      "their turn came."});
+                      "their turn came; with final_bundle it is adjusted to what they see."});
     visit("smooth_path", self.smooth_path,
           OptionField{
               "", 0, 1,

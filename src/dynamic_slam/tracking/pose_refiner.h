@@ -54,15 +54,17 @@ class PoseRefiner {
   struct Refined {
     std::optional<AnchoredPose> pose;
     double right_inliers = 0;
-    FrameView view;  // if it is asked for
+    bool has_view = false;  // is asked for it
+    FrameView view;
   };
 
+  void AskForViews(std::vector<Refined>* refined) const;
   // In the order of time or against it: tracks the frames that are in doubt from those that it came by,
   // and those that are known and not kept.
-  void Pass(bool is_forward, const KnownPoses& known, bool with_views,
-            const std::function<bool()>& should_stop, std::vector<Refined>* refined);
+  void Pass(bool is_forward, const KnownPoses& known, const std::function<bool()>& should_stop,
+            std::vector<Refined>* refined);
   void Track(const KeptFrame& kept, std::span<const KnownPoses::Guess> guesses, const KnownPoses& others,
-             bool with_view, Refined* refined);
+             Refined* refined);
   Frame Restore(const KeptFrame& kept) const;
 
   SharedMap* map_;
