@@ -10,8 +10,9 @@
 namespace dynamic_slam {
 namespace {
 
-// Above this many free poses the reduced camera system is factorised sparsely.
-constexpr int kMostPosesForDenseSchur = 200;
+// Above this many free poses the reduced camera system is factorised sparsely. Ceres takes more memory: with
+// 284 poses of fr1_desk 207 MB at its peak instead of 176, and as much time.
+constexpr int kMostPosesForDenseSchur = 400;
 
 // The rounds of an adjustment, on a copy of the problem.
 class Adjuster {
@@ -105,7 +106,8 @@ BundleSummary Adjuster::Run() {
   BundleSummary summary;
   summary.initial_cost = RobustCost();
   summary.usable = Solve(/*robust=*/true, options_.max_iterations, &summary);
-  // Before its first step the problem may be far from what it becomes: nothing is known of any observation yet.
+  // Before its first step the problem may be far from what it becomes: nothing is known of any observation
+  // yet.
   if (!summary.stopped || summary.iterations > 0) NameOutliers();
   if (summary.usable && !summary.stopped && options_.reject_outliers && options_.refine_iterations > 0) {
     // If this round fails, the values of the first one stand.

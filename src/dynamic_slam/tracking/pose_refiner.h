@@ -27,8 +27,8 @@ class PoseRefiner {
 
   // The poses that are found for those frames that have one in `known`, each in the part of the map where
   // that is: from the frames before or else from the pose that is known, and where that leaves doubt from the
-  // frames after. `should_stop` may be empty; when it says so, that is all. views: gets what every third
-  // frame sees of the map at its new pose, if not null.
+  // frames after. `should_stop` may be empty; when it says so, that is all. views: gets, if not null, what
+  // every third frame between keyframes sees of the map.
   std::vector<AnchoredPose> Refine(std::span<const AnchoredPose> known,
                                    const std::function<bool()>& should_stop,
                                    std::vector<FrameView>* views = nullptr);
