@@ -1,5 +1,6 @@
 #include "dynamic_slam/tracking/pose_refiner.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -19,7 +20,7 @@ constexpr double kNoDoubt = 2;
 // nearer to each other than that, and frames between them made errors 12% larger.
 constexpr int kViewEvery = 3;
 
-// Of more than these every second one: the adjustment has some 250 bytes for each. Half as many cost crowd 22
+// Of more than these some are left out: the adjustment has some 250 bytes for each. Half as many cost crowd 22
 // a tenth of the accuracy.
 constexpr size_t kMostSightings = 300;
 
@@ -32,8 +33,8 @@ FrameView ViewOf(const Frame& frame) {
         {frame.landmarks[i], {keypoint.x, keypoint.y}, keypoint.octave, frame.StaticProbability(i)});
   }
   FrameView view{frame.timestamp_s, frame.cam_from_world, {}};
-  const size_t step = (all.size() + kMostSightings - 1) / kMostSightings;
-  for (size_t i = 0; i < all.size(); i += step) view.sightings.push_back(all[i]);
+  const size_t count = std::min(all.size(), kMostSightings);
+  for (size_t i = 0; i < count; ++i) view.sightings.push_back(all[i * all.size() / count]);
   return view;
 }
 
