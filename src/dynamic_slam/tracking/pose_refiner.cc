@@ -20,8 +20,8 @@ constexpr double kNoDoubt = 2;
 // nearer to each other than that, and frames between them made errors 12% larger.
 constexpr int kViewEvery = 3;
 
-// Of more than these some are left out: the adjustment has some 250 bytes for each. Half as many cost crowd 22
-// a tenth of the accuracy.
+// Of more than these some are left out: the adjustment has some 250 bytes for each. Half as many cost crowd
+// 22 a tenth of the accuracy.
 constexpr size_t kMostSightings = 300;
 
 FrameView ViewOf(const Frame& frame) {
