@@ -257,7 +257,8 @@ TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
   EXPECT_THAT(scene.map.Validate(), IsEmpty());
 }
 
-// Keyframes at the ends of a way share too little to tell their distance well; frames between them see both.
+// Three noisy keyframes tell where the middle one is; eighteen frames between them see the same and tell it
+// better.
 TEST(MapBundleTest, FramesThatSeeTheMapTellWhereItIs) {
   SyntheticWorld world(400, 0.5);
   const auto error_with = [&world](bool with_views) {

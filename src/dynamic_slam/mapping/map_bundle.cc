@@ -52,7 +52,7 @@ class MapBundle {
         if (!HasPose(observation.keyframe)) continue;
         const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
         const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
-        Observe(map, pose_of_[observation.keyframe.value()],
+        Observe(map, landmark, pose_of_[observation.keyframe.value()],
                 {id,
                  {keypoint.x, keypoint.y},
                  keypoint.octave,
@@ -68,7 +68,8 @@ class MapBundle {
       const uint32_t pose = static_cast<uint32_t>(problem_.poses.size());
       problem_.poses.push_back({view.cam_from_world, false});
       for (const FrameView::Sighting& sighting : view.sightings) {
-        if (map.landmarks().Contains(sighting.landmark)) Observe(map, pose, sighting);
+        const Landmark* landmark = map.landmarks().Find(sighting.landmark);
+        if (landmark != nullptr) Observe(map, *landmark, pose, sighting);
       }
     }
   }
@@ -98,11 +99,10 @@ class MapBundle {
   }
 
  private:
-  void Observe(const Map& map, uint32_t pose, const FrameView::Sighting& sighting) {
-    problem_.observations.push_back(
-        {pose, point_of_[sighting.landmark.value()], sighting.ideal_px.cast<double>(),
-         1.0 / map.octave_scales()[static_cast<size_t>(sighting.octave)],
-         TrustInMatch(sighting.static_probability, map.landmarks().At(sighting.landmark).static_log_odds)});
+  void Observe(const Map& map, const Landmark& landmark, uint32_t pose, const FrameView::Sighting& sighting) {
+    problem_.observations.push_back({pose, point_of_[landmark.id().value()], sighting.ideal_px.cast<double>(),
+                                     1.0 / map.octave_scales()[static_cast<size_t>(sighting.octave)],
+                                     TrustInMatch(sighting.static_probability, landmark.static_log_odds)});
   }
 
   // Of the problem's first observations, those of a landmark one after the other.
