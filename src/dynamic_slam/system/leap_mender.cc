@@ -16,7 +16,7 @@ constexpr double kEnds_s[] = {2.0 / 3, 1.0 / 3, 1.0 / 6};
 }  // namespace
 
 int LeapMender::CutOffSides(const std::function<bool()>& should_stop) {
-  return tracked_->Leaps() ? Mend(tracked_->PiecesAtLeaps(), should_stop) : 0;
+  return Mend(tracked_->PiecesAtLeaps(), should_stop);
 }
 
 int LeapMender::MendEnds(const std::function<bool()>& should_stop) {
@@ -68,13 +68,10 @@ int LeapMender::Mend(std::span<const TrackedFrames::Piece> pieces, const std::fu
     });
   });
   const std::vector<PartId> parts = tracked_->CutOff(wrong);
-  for (const TrackedFrames::Piece& piece : wrong) {
-    // A whole side may be right in itself.
-    if (piece.is_end) tracked_->RemoveAllBut(found, piece);
-  }
   if (wrong.front().is_end) {
     tracked_->Replace(found);
-  } else {
+    for (const TrackedFrames::Piece& piece : wrong) tracked_->RemoveAllBut(found, piece);
+  } else {  // a whole side may be right in itself
     tracked_->AddFound(found);
   }
   const std::vector<PartId> with_frames = tracked_->Parts();
