@@ -23,7 +23,14 @@ void KeypointGrid::Build(const FeatureSet& features, const std::array<double, 4>
     cell_of_[i] = static_cast<uint32_t>(Row(keypoint.y) * columns_ + Column(keypoint.x));
     ++cell_begin_[cell_of_[i] + 1];
   }
-  for (size_t cell = 1; cell < cell_begin_.size(); ++cell) cell_begin_[cell] += cell_begin_[cell - 1];
+  filled_.resize(cell_begin_.size());
+  size_t filled = 0;
+  for (size_t cell = 0; cell + 1 < cell_begin_.size(); ++cell) {
+    filled_[filled] = static_cast<uint32_t>(cell);
+    filled += cell_begin_[cell + 1] > 0 ? 1 : 0;
+    cell_begin_[cell + 1] += cell_begin_[cell];
+  }
+  filled_.resize(filled);
   next_ = cell_begin_;
   const size_t padded = count + kLanes - 1;
   x_.resize(padded);

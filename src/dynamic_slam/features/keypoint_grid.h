@@ -32,9 +32,9 @@ class KeypointGrid {
   // Calls fn(std::span<const uint32_t> indices) for each cell that has keypoints, row-major.
   template <class Fn>
   void ForEachCell(Fn&& fn) const {
-    for (size_t cell = 0; cell + 1 < cell_begin_.size(); ++cell) {
+    for (const uint32_t cell : filled_) {
       const uint32_t begin = cell_begin_[cell], end = cell_begin_[cell + 1];
-      if (begin < end) fn(std::span(index_.data() + begin, end - begin));
+      fn(std::span(index_.data() + begin, end - begin));
     }
   }
 
@@ -190,6 +190,7 @@ class KeypointGrid {
   float min_x_ = 0, min_y_ = 0;
   int columns_ = 0, rows_ = 0;
   std::vector<uint32_t> cell_begin_;  // columns * rows + 1
+  std::vector<uint32_t> filled_;      // cells that have keypoints
   // Of the keypoints, cell by cell, and kLanes - 1 more that are nobody's.
   std::vector<float> x_, y_;  // ideal px
   std::vector<int32_t> octave_;

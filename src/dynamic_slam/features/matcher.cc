@@ -44,27 +44,29 @@ std::vector<Descriptor> Gather(const FeatureSet& features, std::span<const uint3
 DS_DISPATCH_POPCNT
 WindowMatch FindInWindow(const FeatureSet& features, const KeypointGrid& grid, const SearchWindow& window,
                          const Descriptor& descriptor, std::span<const uint8_t> taken) {
-  WindowMatch best;
-  uint32_t second = 0;
+  // Which of them is nearer is as hard to predict, so the two nearest are kept without a branch: as numbers
+  // of the distance, the order in which they were found, which decides between equals, and the keypoint.
+  constexpr int kDistanceBit = 55, kOrderBit = 32;
+  constexpr uint64_t kNobody = ~uint64_t{0};
+  uint64_t best = kNobody, second = kNobody, order = 0;
   const auto visit = [&](uint32_t index) __attribute__((always_inline)) {
-    if (!taken.empty() && taken[index] != 0) return;
-    const int distance = HammingDistance(descriptor, features.descriptors[index]);
-    if (distance < best.distance) {
-      second = best.keypoint;
-      best.second_distance = best.distance;
-      best.keypoint = index;
-      best.distance = distance;
-    } else if (distance < best.second_distance) {
-      second = index;
-      best.second_distance = distance;
-    }
+    const auto distance = static_cast<uint64_t>(HammingDistance(descriptor, features.descriptors[index]));
+    uint64_t rank = distance << kDistanceBit | order | index;
+    if (!taken.empty()) rank |= -uint64_t{taken[index] != 0};
+    order += uint64_t{1} << kOrderBit;
+    second = std::min(second, std::max(best, rank));
+    best = std::min(best, rank);
   };
   grid.ForEachInWindow(window.x, window.y, window.radius_px, window.min_octave, window.max_octave, visit);
-  if (best.Found()) best.octave = features.keypoints[best.keypoint].octave;
-  if (best.second_distance < WindowMatch().second_distance) {
-    best.second_octave = features.keypoints[second].octave;
-  }
-  return best;
+  WindowMatch match;
+  if (best == kNobody) return match;
+  match.keypoint = static_cast<uint32_t>(best);
+  match.distance = static_cast<int>(best >> kDistanceBit);
+  match.octave = features.keypoints[match.keypoint].octave;
+  if (second == kNobody) return match;
+  match.second_distance = static_cast<int>(second >> kDistanceBit);
+  match.second_octave = features.keypoints[static_cast<uint32_t>(second)].octave;
+  return match;
 }
 
 std::vector<Match> MatchMutual(const FeatureSet& first, std::span<const uint32_t> first_indices,

@@ -113,18 +113,20 @@ float DynamicFilter::Combine(float prior, float motion_log_odds) const {
   return static_cast<float>(std::min(TrustInMatch(prior, motion_log_odds), 1 - options_.missed_object));
 }
 
-void DynamicFilter::CombineAll(Frame* frame) const {
-  float prior = -1, log_odds = 0, p = 0;  // of the one before: in a cell most are alike
-  frame->grid.ForEachCell([&](std::span<const uint32_t> cell) {
-    for (const uint32_t i : cell) {
-      if (frame->motion_log_odds[i] != log_odds || prior_[i] != prior) {
-        log_odds = frame->motion_log_odds[i];
-        prior = prior_[i];
-        p = Combine(prior, log_odds);
-      }
-      frame->static_probability[i] = p;
-    }
-  });
+void DynamicFilter::CombineAll(Frame* frame) {
+  // Most are in no box and nobody asked them how they move.
+  const float prior = Prior(1);
+  const size_t n = by_boxes_.prior.size();
+  frame->static_probability.assign(n, Combine(prior, 0));
+  chosen_.resize(n);
+  size_t count = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    chosen_[count] = i;
+    count += static_cast<size_t>((by_boxes_.prior[i] != prior) | (frame->motion_log_odds[i] != 0));
+  }
+  for (const uint32_t i : std::span(chosen_).first(count)) {
+    frame->static_probability[i] = Combine(by_boxes_.prior[i], frame->motion_log_odds[i]);
+  }
 }
 
 DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const KeypointFlow& flow,
@@ -167,22 +169,17 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     }
     if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   }
-  in_box_.resize(n);
-  prior_.resize(n);
-  for (size_t i = 0; i < n; ++i) {
-    const double at_rest = AtRestByBoxes(objects_, frame->features.keypoints[i], &in_box_[i]);
-    if (weights) {
-      prior_[i] = Prior(at_rest);
-    } else if (in_box_[i] != 0) {
-      frame->static_probability[i] = 0;
-    }
+  JudgeByBoxes(objects_, frame->features, &by_boxes_);
+  if (weights) {
+    CombineAll(frame);
+  } else {
+    for (size_t i = 0; i < n; ++i) frame->static_probability[i] = by_boxes_.in_box[i] != 0 ? 0.0f : 1.0f;
   }
-  if (weights) CombineAll(frame);
   if (options_.method == "paper") JudgeByDisplacement(flow, last, frame);
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
     const bool used = frame->static_probability[i] >= kMinStaticProbability;
-    ++(in_box_[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
+    ++(by_boxes_.in_box[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
   }
   return counts;
 }
@@ -202,12 +199,12 @@ void DynamicFilter::JudgeLate(std::span<const DynamicBox> boxes, const FeatureSe
   }
   if (objects.empty()) return;
   static_probability->resize(features.size(), 1.0f);
+  ByBoxes by_boxes;
+  JudgeByBoxes(objects, features, &by_boxes);
   for (size_t i = 0; i < features.size(); ++i) {
-    uint8_t in_boxes = 0;
-    const double at_rest = AtRestByBoxes(objects, features.keypoints[i], &in_boxes);
-    if (in_boxes == 0) continue;
+    if (by_boxes.in_box[i] == 0) continue;
     float& p = (*static_probability)[i];
-    p = options_.method == "weights" ? std::min(p, Prior(at_rest)) : 0;
+    p = options_.method == "weights" ? std::min(p, by_boxes.prior[i]) : 0;
   }
 }
 
@@ -216,22 +213,33 @@ double DynamicFilter::MarginOf(const Box& box) const {
 }
 
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
-// of these objects, each as likely as the other. Without branches: where keypoints are is hard to predict.
-double DynamicFilter::AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint,
-                                    uint8_t* in_boxes) const {
-  const double outline_px = outlines_px_[static_cast<size_t>(keypoint.octave)];
-  double belongs_to_none = 1, sum_moves = 0;
-  int boxes = 0;
-  *in_boxes = 0;
+// of these objects, each as likely as the other. However many overlap, motion can still overrule them. Who is
+// in a box is found without branches: where keypoints are is hard to predict.
+void DynamicFilter::JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features,
+                                 ByBoxes* result) const {
+  const size_t n = features.size();
+  result->in_box.assign(n, 0);
+  result->prior.assign(n, Prior(1));
+  result->chances.assign(n, {});
+  result->inside.resize(n);
   for (const Object& object : objects) {
-    const bool is_inside = object.IsMoving() & object.box.box.Contains(keypoint.raw_x, keypoint.raw_y,
-                                                                       object.margin_px + outline_px);
-    belongs_to_none *= is_inside ? 1 - options_.object_share : 1;
-    sum_moves += is_inside ? object.moves : 0;
-    boxes += is_inside ? 1 : 0;
-    *in_boxes |= static_cast<uint8_t>(is_inside * object.witnesses);
+    if (!object.IsMoving()) continue;
+    size_t count = 0;
+    for (uint32_t i = 0; i < n; ++i) {
+      const Keypoint& keypoint = features.keypoints[i];
+      const double reach_px = object.margin_px + outlines_px_[static_cast<size_t>(keypoint.octave)];
+      result->inside[count] = i;
+      count += static_cast<size_t>(object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, reach_px));
+    }
+    for (const uint32_t i : std::span(result->inside).first(count)) {
+      ByBoxes::Chances& chances = result->chances[i];
+      chances.belongs_to_none *= 1 - options_.object_share;
+      chances.sum_moves += object.moves;
+      ++chances.boxes;
+      result->in_box[i] |= object.witnesses;
+      result->prior[i] = Prior(1 - (1 - chances.belongs_to_none) * chances.sum_moves / chances.boxes);
+    }
   }
-  return 1 - (1 - belongs_to_none) * sum_moves / std::max(1, boxes);
 }
 
 // Algorithm 2.
@@ -328,7 +336,7 @@ void DynamicFilter::AskPastViews(const KeypointFlow& flow, double nearest_depth,
   suspects_.clear();
   for (const Object& object : objects_)
     suspects_.push_back({object.box.box, object.margin_px, &object.shifts});
-  ChooseWitnesses(*frame, in_box_, flow.last_keypoints(), &asked_);
+  ChooseWitnesses(*frame, by_boxes_.in_box, flow.last_keypoints(), &asked_);
   const std::span<const float> evidence = past_views_.Judge(*frame, asked_, suspects_, nearest_depth);
   for (size_t i = 0; i < evidence.size(); ++i) {
     AddEvidence(evidence[i], &frame->motion_log_odds[i]);

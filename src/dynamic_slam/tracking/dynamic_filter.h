@@ -87,6 +87,19 @@ class DynamicFilter {
     BoxMotion motion;
   };
 
+  // What the boxes alone say of each keypoint.
+  struct ByBoxes {
+    struct Chances {
+      double belongs_to_none = 1, sum_moves = 0;
+      int boxes = 0;
+    };
+    std::vector<uint8_t> in_box;  // WitnessesOf the boxes that it is in
+    std::vector<float> prior;     // P(at rest)
+    // Kept for their memory.
+    std::vector<Chances> chances;
+    std::vector<uint32_t> inside;  // the box in hand
+  };
+
   // Where a point at rest is in this frame: on the segment, by its depth, ideal px.
   struct RestPlace {
     Eigen::Vector2d far_px, near_px;
@@ -96,11 +109,10 @@ class DynamicFilter {
   void JudgeByDisplacement(const KeypointFlow& flow, const Frame& last, Frame* frame) const;
   float Combine(float prior, float motion_log_odds) const;
   // P(at rest) of each keypoint, by the boxes and by how it moved.
-  void CombineAll(Frame* frame) const;
+  void CombineAll(Frame* frame);
   double MarginOf(const Box& box) const;
-  double AtRestByBoxes(std::span<const Object> objects, const Keypoint& keypoint, uint8_t* in_boxes) const;
-  // P(at rest) by boxes alone: however many overlap, motion can still overrule them.
-  float Prior(double at_rest) const;
+  void JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features, ByBoxes* result) const;
+  float Prior(double at_rest) const;  // within the bounds of what boxes may say
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.
   template <class Rest>
@@ -115,13 +127,12 @@ class DynamicFilter {
   std::vector<Object> objects_, last_objects_;
   std::vector<Box> boxes_;  // of objects_
   PastViews past_views_;
-  std::vector<float> prior_;  // P(at rest) of each keypoint by the boxes alone
+  ByBoxes by_boxes_;
 
   // Kept from frame to frame for their memory.
   std::vector<Mover> movers_;
-  std::vector<uint8_t> in_box_;  // of each keypoint: WitnessesOf the boxes that it is in
   std::vector<PastViews::Object> suspects_;
-  std::vector<uint32_t> asked_;  // keypoints
+  std::vector<uint32_t> asked_, chosen_;  // keypoints
   BoxMotionEstimator estimator_;
   std::vector<Box> boxes_before_;
   std::vector<Eigen::Vector2d> expected_px_;

@@ -47,7 +47,7 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
   }
   is_of_witnesses_ = of == Of::kWitnesses;
   if (is_of_witnesses_) {
-    if (before_.size() != n) before_.clear();  // of another frame
+    if (before_.size() != n) before_.assign(n, kNotFollowed);  // of another frame
     ChooseWitnesses(last, near_, before_, &asked_);
   } else {
     asked_.clear();

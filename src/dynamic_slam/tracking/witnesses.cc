@@ -1,5 +1,8 @@
 #include "dynamic_slam/tracking/witnesses.h"
 
+#include <algorithm>
+#include <bit>
+
 namespace dynamic_slam {
 
 // Without branches for single keypoints, as which of them are candidates, known or followed is hard to
@@ -11,19 +14,19 @@ void ChooseWitnesses(const Frame& frame, std::span<const uint8_t> candidates,
   size_t count = 0;
   frame.grid.ForEachCell([&](std::span<const uint32_t> cell) {
     const size_t before = count;
-    uint32_t best = 0;
-    float most = -1;
+    uint64_t best = 0;  // its worth and, as the first of equals is taken, the complement of its index
     for (const uint32_t i : cell) {
-      const bool speaks_for_itself = ((candidates[i] & kOfFew) != 0) | frame.landmarks[i].IsValid();
-      const bool was_followed = !last_keypoints.empty() && last_keypoints[i] != kNotFollowed;
-      const float worth = frame.features.keypoints[i].response + (was_followed ? kFollowed : 0);
-      const bool is_better = (candidates[i] != 0) & (worth > most);
-      best = is_better ? i : best;
-      most = is_better ? worth : most;
+      const uint64_t is_candidate = candidates[i] != 0;
+      const uint64_t speaks_for_itself = ((candidates[i] & kOfFew) != 0) | frame.landmarks[i].IsValid();
+      const uint32_t was_followed = last_keypoints[i] != kNotFollowed;
+      const float worth = frame.features.keypoints[i].response + kFollowed * static_cast<float>(was_followed);
+      // The bits of numbers that are not negative are in their order.
+      const uint64_t rank = uint64_t{std::bit_cast<uint32_t>(worth)} << 32 | ~i;
+      best = std::max(best, rank & -is_candidate);
       (*witnesses)[count] = i;
-      count += static_cast<size_t>((candidates[i] != 0) & speaks_for_itself);
+      count += is_candidate & speaks_for_itself;
     }
-    if (count == before && most >= 0) (*witnesses)[count++] = best;
+    if (count == before && best != 0) (*witnesses)[count++] = ~static_cast<uint32_t>(best);
   });
   witnesses->resize(count);
 }

@@ -28,7 +28,7 @@ inline uint8_t WitnessesOf(const Box& box) {
 // their cells of the grid: what moves is a surface, and its keypoints tell nearly the same. All of few, and
 // all that show a landmark, as the pose hangs on them; in a cell without, one: rather one that was followed
 // from the last frame, as it knows more, and the strongest corner of these. last_keypoints: of each keypoint,
-// the one of the last frame or kNotFollowed; empty where that is not known.
+// the one of the last frame or kNotFollowed.
 void ChooseWitnesses(const Frame& frame, std::span<const uint8_t> candidates,
                      std::span<const uint32_t> last_keypoints, std::vector<uint32_t>* witnesses);
 

@@ -82,10 +82,10 @@ TEST_F(WitnessesTest, OnlyCandidates) {
   EXPECT_THAT(Choose(), ::testing::ElementsAre(2));
 }
 
-TEST_F(WitnessesTest, TheStrongestCornerWhereNothingIsKnownOfTheLastFrame) {
+TEST_F(WitnessesTest, TheFirstOfEquals) {
   Add(2, 2, 50);
   Add(3, 9, 60);
-  last_keypoints_.clear();
+  Add(9, 9, 60);
   EXPECT_THAT(Choose(), ::testing::ElementsAre(1));
 }
 
