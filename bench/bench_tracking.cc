@@ -40,8 +40,8 @@ constexpr int kOrbFrameStep = 2;  // every second frame is enough for a median
 
 // What a frame costs because something may move in it: boxes over time, how keypoints move in and around
 // them, and what that says of keypoints and objects.
-constexpr std::string_view kSemanticScopes[] = {"detection/collect", "tracking/flow", "tracking/judge",
-                                                "tracking/watch", "tracking/seeds"};
+constexpr std::string_view kSemanticScopes[] = {"detection/collect", "detection/rotation", "tracking/flow",
+                                                "tracking/judge",    "tracking/watch",     "tracking/seeds"};
 
 struct BenchArguments {
   std::string source;

@@ -16,30 +16,34 @@ void KeypointGrid::Build(const FeatureSet& features, const std::array<double, 4>
 
   // Counting sort by cell; stable, so a cell's keypoints keep their order.
   const size_t count = features.size();
-  cell_begin_.assign(static_cast<size_t>(columns_) * rows_ + 1, 0);
+  const size_t cells = static_cast<size_t>(columns_) * rows_;
+  cell_begin_.assign(cells + 1, 0);
   cell_of_.resize(count);
   for (size_t i = 0; i < count; ++i) {
     const Keypoint& keypoint = features.keypoints[i];
     cell_of_[i] = static_cast<uint32_t>(Row(keypoint.y) * columns_ + Column(keypoint.x));
-    ++cell_begin_[cell_of_[i] + 1];
+    ++cell_begin_[cell_of_[i]];
   }
-  filled_.resize(cell_begin_.size());
+  filled_.resize(cells);
   size_t filled = 0;
-  for (size_t cell = 0; cell + 1 < cell_begin_.size(); ++cell) {
-    filled_[filled] = static_cast<uint32_t>(cell);
-    filled += cell_begin_[cell + 1] > 0 ? 1 : 0;
-    cell_begin_[cell + 1] += cell_begin_[cell];
+  uint32_t end = 0;
+  for (uint32_t cell = 0; cell < cells; ++cell) {
+    filled_[filled] = cell;
+    filled += cell_begin_[cell] > 0 ? 1 : 0;
+    end += cell_begin_[cell];
+    cell_begin_[cell] = end;
   }
+  cell_begin_[cells] = end;
   filled_.resize(filled);
-  next_ = cell_begin_;
   const size_t padded = count + kLanes - 1;
   x_.resize(padded);
   y_.resize(padded);
   octave_.resize(padded);
   index_.resize(padded);
-  for (size_t i = 0; i < count; ++i) {
+  // From the last one, so that the ends of cells become their beginnings.
+  for (size_t i = count; i-- > 0;) {
     const Keypoint& keypoint = features.keypoints[i];
-    const uint32_t place = next_[cell_of_[i]]++;
+    const uint32_t place = --cell_begin_[cell_of_[i]];
     x_[place] = keypoint.x;
     y_[place] = keypoint.y;
     octave_[place] = keypoint.octave;

@@ -195,7 +195,7 @@ class KeypointGrid {
   std::vector<float> x_, y_;  // ideal px
   std::vector<int32_t> octave_;
   std::vector<uint32_t> index_;
-  std::vector<uint32_t> cell_of_, next_;
+  std::vector<uint32_t> cell_of_;
 };
 
 }  // namespace dynamic_slam

@@ -50,7 +50,7 @@ class BoxCompensation {
 
   // The boxes in the next frame. Ids of frames grow. Detections that make no sense (not finite, without
   // area, outside the image, scored outside [0, 1]) are dropped.
-  virtual std::vector<CompensatedBox> Update(const CompensationInput& input) = 0;
+  virtual std::vector<CompensatedBox> Update(CompensationInput input) = 0;
 
   // Takes a result that arrives after its frame's Update, and all frames since are computed again. False when
   // the frame is not among the last kHistoryFrames: nothing changes.

@@ -15,11 +15,11 @@ namespace dynamic_slam {
 template <class State>
 class ReplayingCompensation : public BoxCompensation {
  public:
-  std::vector<CompensatedBox> Update(const CompensationInput& input) final {
+  std::vector<CompensatedBox> Update(CompensationInput input) final {
     DS_CHECK(history_.empty() || history_.back().input.frame < input.frame, "frame {} does not follow {}",
              input.frame.value(), history_.back().input.frame.value());
-    history_.push_back({input, state_});
-    if (input.detections) history_.back().input.detections = Usable(*input.detections);
+    if (input.detections) input.detections = Usable(*input.detections);
+    history_.push_back({std::move(input), state_});
     if (history_.size() > kHistoryFrames) history_.pop_front();
     Replay(history_.size() - 1);
     return Boxes();

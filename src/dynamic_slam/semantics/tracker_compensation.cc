@@ -144,7 +144,7 @@ void TrackerCompensation::Advance(const CompensationInput& input, TrackerState* 
   }
 }
 
-void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* state) const {
+void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* state) {
   double elapsed_s = input.timestamp_s - state->timestamp_s;
   if (!(elapsed_s > 0)) elapsed_s = 1 / (camera_.fps > 0 ? camera_.fps : 30);
   state->timestamp_s = input.timestamp_s;
@@ -174,9 +174,8 @@ void TrackerCompensation::Predict(const CompensationInput& input, TrackerState* 
     turns.push_back(camera);
     expected_px.push_back(camera.shift_px + step_s * track.filter.velocity_px_s());
   }
-  BoxMotionEstimator estimator;
   const std::span<const std::optional<BoxMotion>> seen =
-      estimator.Estimate(boxes, expected_px, input.motions);
+      estimator_.Estimate(boxes, expected_px, input.motions);
   for (size_t t = 0; t < boxes.size(); ++t) {
     BoxFilter& filter = state->tracks[t].filter;
     if (seen[t]) {

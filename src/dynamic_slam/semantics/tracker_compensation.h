@@ -82,8 +82,8 @@ struct TrackerState {
 //   a result says nothing against an object.
 // - An object behind another one is still there: not to see it takes hidden_evidence only. The two must have
 //   been seen beside each other, else they may be one object with two boxes.
-// - Where boxes overlap, each point that is followed speaks for the box whose motion it fits (BoxMotionEstimator):
-// an
+// - Where boxes overlap, each point that is followed speaks for the box whose motion it fits
+// (BoxMotionEstimator): an
 //   object behind another one moves on with its own velocity.
 // - An object out of view is remembered while its evidence lasts, as the camera may turn back.
 class TrackerCompensation : public ReplayingCompensation<TrackerState> {
@@ -96,7 +96,7 @@ class TrackerCompensation : public ReplayingCompensation<TrackerState> {
   std::vector<CompensatedBox> BoxesOf(const TrackerState& state) const override;
 
  private:
-  void Predict(const CompensationInput& input, TrackerState* state) const;
+  void Predict(const CompensationInput& input, TrackerState* state);
   // Gives detections to tracks; returns those that are left.
   std::vector<Detection> Match(const std::vector<Detection>& detections, TrackerState* state) const;
   void Begin(const Detection& detection, TrackerState* state);
@@ -113,6 +113,7 @@ class TrackerCompensation : public ReplayingCompensation<TrackerState> {
 
   TrackerCompensationOptions options_;
   Camera camera_;
+  BoxMotionEstimator estimator_;
 };
 
 }  // namespace dynamic_slam

@@ -96,7 +96,7 @@ FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
     objects.state = DetectionState::kFailed;
     objects.reason = failure_;
   }
-  objects.boxes = score_.Update(compensation_->Update(input));
+  objects.boxes = score_.Update(compensation_->Update(std::move(input)));
   objects.untold_from = UntoldFrom(timestamp_s);
   if (told_late_.IsValid()) objects.late = NewlyTold(told_late_);
   return objects;
@@ -121,6 +121,7 @@ std::vector<LateObjects> DetectionStage::NewlyTold(FrameId told) const {
 }
 
 void DetectionStage::SetRotation(FrameId frame, const Eigen::Quaterniond& cam_from_last) {
+  DS_TRACE("detection/rotation");
   compensation_->UpdateRotation(frame, cam_from_last);
 }
 
