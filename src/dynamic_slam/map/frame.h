@@ -73,6 +73,7 @@ struct FrameView {
     float static_probability = 1;
   };
   double timestamp_s = 0;
+  PartId part;  // of the map
   Rigid3 cam_from_world;
   std::vector<Sighting> sightings;
 };

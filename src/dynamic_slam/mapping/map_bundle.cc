@@ -1,11 +1,15 @@
 #include "dynamic_slam/mapping/map_bundle.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <optional>
 #include <vector>
 
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/optimize/path_smoother.h"
 
 namespace dynamic_slam {
 namespace {
@@ -14,6 +18,9 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 // Landmarks that are refreshed before others may look at the map again.
 constexpr size_t kRefreshedAtOnce = 100;
+
+// Between images that are nearer in time nobody knows how fast a camera is.
+constexpr double kMinStep_s = 1e-3;
 
 // A bundle problem made of parts of the map, and the way back.
 class MapBundle {
@@ -62,14 +69,38 @@ class MapBundle {
     }
   }
 
-  // After them.
+  // After them. What carries a camera has mass (optimize/path_smoother.h).
   void AddViews(const Map& map, std::span<const FrameView> views) {
     for (const FrameView& view : views) {
       const uint32_t pose = static_cast<uint32_t>(problem_.poses.size());
       problem_.poses.push_back({view.cam_from_world, false});
+      AddToPath(view.part, view.timestamp_s, pose);
       for (const FrameView::Sighting& sighting : view.sightings) {
         const Landmark* landmark = map.landmarks().Find(sighting.landmark);
         if (landmark != nullptr) Observe(map, *landmark, pose, sighting);
+      }
+    }
+  }
+
+  // After all poses of this run: how they follow each other.
+  void AddMotions(const Map& map) {
+    for (size_t i = 0; i < keyframes_.size(); ++i) {
+      const Keyframe& keyframe = map.keyframes().At(keyframes_[i]);
+      const bool is_from_file = !keyframe.frame_id().IsValid();
+      if (!is_from_file) AddToPath(keyframe.part(), keyframe.timestamp_s(), static_cast<uint32_t>(i));
+    }
+    for (const auto& [part, path] : paths_) {
+      Trajectory trajectory;
+      std::vector<uint32_t> poses;
+      for (const auto& [stamp, pose] : path) {
+        trajectory.push_back({stamp, problem_.poses[pose].cam_from_world.Inverse()});
+        poses.push_back(pose);
+      }
+      if (!HoldScale(map, part)) continue;
+      size_t first = 0;
+      for (const std::span<const StampedPose> shot : ShotsOf(trajectory)) {
+        AddMotionsOf(shot, std::span(poses).subspan(first, shot.size()));
+        first += shot.size();
       }
     }
   }
@@ -99,6 +130,38 @@ class MapBundle {
   }
 
  private:
+  void AddMotionsOf(std::span<const StampedPose> shot, std::span<const uint32_t> poses) {
+    const double noise = AccelerationNoise(shot);
+    if (!(noise > 0)) return;
+    for (size_t i = 2; i < shot.size(); ++i) {
+      BundleProblem::Motion motion;
+      motion.poses = {poses[i - 2], poses[i - 1], poses[i]};
+      motion.first_s = shot[i - 1].timestamp_s - shot[i - 2].timestamp_s;
+      motion.second_s = shot[i].timestamp_s - shot[i - 1].timestamp_s;
+      if (std::min(motion.first_s, motion.second_s) < kMinStep_s) continue;
+      motion.inverse_sigma = 1 / std::sqrt(0.5 * noise * (motion.first_s + motion.second_s));
+      problem_.motions.push_back(motion);
+    }
+  }
+
+  // A part may shrink without a change of what is seen of it, and slower motion is more probable: a landmark
+  // of its origin holds its scale. False if there is none.
+  bool HoldScale(const Map& map, PartId part) {
+    const Landmark* best = nullptr;
+    for (const KeyframeId id : keyframes_) {
+      const Keyframe& keyframe = map.keyframes().At(id);
+      if (keyframe.part() != part || !map.IsOrigin(id)) continue;
+      keyframe.ForEachLandmark([&](uint32_t, LandmarkId seen) {
+        const Landmark& landmark = map.landmarks().At(seen);
+        if (best == nullptr || landmark.observations().size() > best->observations().size()) best = &landmark;
+      });
+    }
+    if (best != nullptr) problem_.points[point_of_[best->id().value()]].fixed = true;
+    return best != nullptr;
+  }
+
+  void AddToPath(PartId part, double timestamp_s, uint32_t pose) { paths_[part].emplace(timestamp_s, pose); }
+
   void Observe(const Map& map, const Landmark& landmark, uint32_t pose, const FrameView::Sighting& sighting) {
     problem_.observations.push_back({pose, point_of_[landmark.id().value()], sighting.ideal_px.cast<double>(),
                                      1.0 / map.octave_scales()[static_cast<size_t>(sighting.octave)],
@@ -186,6 +249,7 @@ class MapBundle {
   std::vector<KeyframeId> keyframes_;
   std::vector<LandmarkId> landmarks_;
   std::vector<Link> links_;
+  std::map<PartId, std::map<double, uint32_t>> paths_;  // by time
 };
 
 MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& map) {
@@ -259,14 +323,17 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
                         const std::function<bool()>& should_stop, SharedMap* map,
-                        std::span<const FrameView> views) {
+                        std::optional<std::span<const FrameView>> path) {
   DS_TRACE("mapping/adjust all");
   std::optional<MapBundle> bundle;
   {
     const auto locked = map->Read();
     if (locked->keyframes().size() < 2) return {};
     bundle = WholeBundle(*locked);
-    bundle->AddViews(*locked, views);
+    if (path.has_value()) {
+      bundle->AddViews(*locked, *path);
+      bundle->AddMotions(*locked);
+    }
   }
   return SolveAndWriteBack(camera, options.final_bundle, should_stop, &*bundle, map);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "dynamic_slam/geometry/camera.h"
@@ -24,6 +25,6 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 // those, only what they say of keyframes and landmarks is written back.
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
                         const std::function<bool()>& should_stop, SharedMap* map,
-                        std::span<const FrameView> views = {});
+                        std::optional<std::span<const FrameView>> path = {});
 
 }  // namespace dynamic_slam

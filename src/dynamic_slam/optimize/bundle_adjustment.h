@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -12,7 +13,8 @@
 
 namespace dynamic_slam {
 
-// Poses, points and what the poses saw of the points. Fixed poses and points constrain but do not move.
+// Poses, points, what the poses saw of the points, and how the poses follow each other. Fixed poses and
+// points constrain but do not move.
 struct BundleProblem {
   struct Pose {
     Rigid3 cam_from_world;
@@ -30,9 +32,18 @@ struct BundleProblem {
     double weight = 1.0;            // trust in the observation: 1 is certain, 0 is not used
   };
 
+  // Of three poses, one after the other: what carries a camera has mass, so its mean velocity from the first
+  // to the second is nearly that from the second to the third.
+  struct Motion {
+    std::array<uint32_t, 3> poses{};   // indices in poses
+    double first_s = 0, second_s = 0;  // the times between them
+    double inverse_sigma = 1;  // 1 / (standard deviation of the change of velocity), s per unit of the map
+  };
+
   std::vector<Pose> poses;
   std::vector<Point> points;
   std::vector<Observation> observations;
+  std::vector<Motion> motions;
 };
 
 struct BundleOptions {

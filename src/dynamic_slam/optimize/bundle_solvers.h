@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,12 @@ namespace dynamic_slam {
 // Huber's loss of a squared error, with its corner at chi2.
 inline double HuberLoss(double squared_error, double chi2) {
   return squared_error <= chi2 ? squared_error : 2 * std::sqrt(chi2 * squared_error) - chi2;
+}
+
+// The change of velocity, in sigmas, is the sum of the camera's centres times these.
+inline std::array<double, 3> MotionFactors(const BundleProblem::Motion& motion) {
+  const double first = motion.inverse_sigma / motion.first_s, second = motion.inverse_sigma / motion.second_s;
+  return {first, -first - second, second};
 }
 
 struct BundleSolverOptions {

@@ -32,6 +32,14 @@ double Cost(const BundleProblem& problem, double huber_chi2) {
                                  observation.inverse_sigma_px * observation.inverse_sigma_px;
     cost += 0.5 * observation.weight * HuberLoss(squared_error, huber_chi2);
   }
+  for (const BundleProblem::Motion& motion : problem.motions) {
+    const auto centre = [&](int k) {
+      return problem.poses[motion.poses[k]].cam_from_world.TargetOriginInSource();
+    };
+    const Eigen::Vector3d change =
+        (centre(2) - centre(1)) / motion.second_s - (centre(1) - centre(0)) / motion.first_s;
+    cost += 0.5 * (motion.inverse_sigma * change).squaredNorm();
+  }
   return cost;
 }
 
@@ -53,6 +61,10 @@ TEST_P(BundleSolversTest, BothFindTheSameMinimum) {
     }
     for (size_t i = 0; i < problem.points.size(); i += 10) problem.points[i].fixed = true;
     problem.poses[4].fixed = true;
+    // Of every second pose from one of the fixed on.
+    for (uint32_t i = 1; i + 4 < problem.poses.size(); ++i) {
+      problem.motions.push_back({{i, i + 2, i + 4}, 0.1, random.Uniform(0.05, 0.2), random.Uniform(1, 20)});
+    }
     BundleSolverOptions options;
     options.huber_chi2 = huber_chi2;
     options.max_iterations = 100;

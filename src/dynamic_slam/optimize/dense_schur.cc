@@ -101,6 +101,11 @@ class DenseSchur {
   bool IsFreePoint(size_t point) const {
     return !problem_->points[point].fixed && begin_[point] < begin_[point + 1];
   }
+  Eigen::Vector3d ChangeOfVelocity(const BundleProblem::Motion& motion,
+                                   const std::vector<PoseValue>& poses) const;
+  void LineariseMotions();
+  // What the motions couple, into blocks_.
+  void CoupleMotions();
   double Loss(double squared_error, double weight, double* slope) const;
   double Cost(const std::vector<PoseValue>& poses, const std::vector<Eigen::Vector3d>& points) const;
   void Linearise();
@@ -116,7 +121,7 @@ class DenseSchur {
   std::vector<Row> rows_;        // by point, there by slot: those of fixed poses are the last
   std::vector<uint32_t> begin_;  // of each point's rows, and the end
   uint32_t free_poses_ = 0;
-  std::vector<uint32_t> pose_of_slot_;
+  std::vector<uint32_t> pose_of_slot_, slot_of_pose_;
 
   std::vector<PoseValue> poses_, trial_poses_;
   std::vector<Eigen::Vector3d> points_, trial_points_;
@@ -141,17 +146,17 @@ DenseSchur::DenseSchur(const Camera& camera, const BundleSolverOptions& options,
     : camera_(camera), options_(options), problem_(problem) {
   const size_t points = problem->points.size();
   begin_.assign(points + 1, 0);
-  std::vector<uint32_t> slot_of_pose(problem->poses.size(), kFixed);
+  slot_of_pose_.assign(problem->poses.size(), kFixed);
   for (size_t i = 0; i < skip.size(); ++i) {
     if (skip[i] != 0) continue;
     const BundleProblem::Observation& observation = problem->observations[i];
     ++begin_[observation.point + 1];
-    if (!problem->poses[observation.pose].fixed) slot_of_pose[observation.pose] = 0;
+    if (!problem->poses[observation.pose].fixed) slot_of_pose_[observation.pose] = 0;
   }
   for (size_t i = 0; i < points; ++i) begin_[i + 1] += begin_[i];
-  for (uint32_t pose = 0; pose < slot_of_pose.size(); ++pose) {
-    if (slot_of_pose[pose] == kFixed) continue;
-    slot_of_pose[pose] = free_poses_++;
+  for (uint32_t pose = 0; pose < slot_of_pose_.size(); ++pose) {
+    if (slot_of_pose_[pose] == kFixed) continue;
+    slot_of_pose_[pose] = free_poses_++;
     pose_of_slot_.push_back(pose);
   }
   rows_.resize(begin_.back());
@@ -160,8 +165,8 @@ DenseSchur::DenseSchur(const Camera& camera, const BundleSolverOptions& options,
     if (skip[i] != 0) continue;
     const BundleProblem::Observation& observation = problem->observations[i];
     rows_[next[observation.point]++] = {
-        observation.pose,         slot_of_pose[observation.pose], observation.ideal_px.x(),
-        observation.ideal_px.y(), observation.inverse_sigma_px,   observation.weight};
+        observation.pose,         slot_of_pose_[observation.pose], observation.ideal_px.x(),
+        observation.ideal_px.y(), observation.inverse_sigma_px,    observation.weight};
   }
   for (size_t i = 0; i < points; ++i) {
     std::stable_sort(rows_.begin() + begin_[i], rows_.begin() + begin_[i + 1],
@@ -214,7 +219,55 @@ double DenseSchur::Cost(const std::vector<PoseValue>& poses,
       cost += Loss(ru * ru + rv * rv, row.weight, &slope);
     }
   }
+  for (const BundleProblem::Motion& motion : problem_->motions) {
+    cost += ChangeOfVelocity(motion, poses).squaredNorm();
+  }
   return 0.5 * cost;
+}
+
+Eigen::Vector3d DenseSchur::ChangeOfVelocity(const BundleProblem::Motion& motion,
+                                             const std::vector<PoseValue>& poses) const {
+  const std::array<double, 3> factors = MotionFactors(motion);
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();
+  for (size_t k = 0; k < factors.size(); ++k) {
+    const PoseValue& pose = poses[motion.poses[k]];
+    change -= factors[k] * (pose.matrix.transpose() * pose.translation);
+  }
+  return change;
+}
+
+// The centre -R^T t moves by -R^T v with an increment (rotation w, translation v) from the left, whatever w
+// is.
+void DenseSchur::LineariseMotions() {
+  for (const BundleProblem::Motion& motion : problem_->motions) {
+    const std::array<double, 3> factors = MotionFactors(motion);
+    const Eigen::Vector3d change = ChangeOfVelocity(motion, poses_);
+    for (size_t k = 0; k < factors.size(); ++k) {
+      const uint32_t slot = slot_of_pose_[motion.poses[k]];
+      if (slot == kFixed) continue;
+      for (int i = 3; i < 6; ++i) pose_hessians_[36 * slot + 7 * i] += factors[k] * factors[k];
+      pose_gradient_.segment<3>(6 * slot + 3) -= factors[k] * (poses_[motion.poses[k]].matrix * change);
+    }
+  }
+}
+
+void DenseSchur::CoupleMotions() {
+  for (const BundleProblem::Motion& motion : problem_->motions) {
+    const std::array<double, 3> factors = MotionFactors(motion);
+    for (size_t k = 0; k < factors.size(); ++k) {
+      for (size_t l = 0; l < factors.size(); ++l) {
+        const uint32_t a = slot_of_pose_[motion.poses[k]], b = slot_of_pose_[motion.poses[l]];
+        if (a >= b || b == kFixed) continue;
+        const Eigen::Matrix3d coupling =
+            factors[k] * factors[l] *
+            (poses_[motion.poses[k]].matrix * poses_[motion.poses[l]].matrix.transpose());
+        double* block = &blocks_[(static_cast<size_t>(a) * free_poses_ + b) * kPoseBlock];
+        for (int i = 0; i < 3; ++i) {
+          for (int j = 0; j < 3; ++j) block[(3 + i) * kRow + 3 + j] += coupling(i, j);
+        }
+      }
+    }
+  }
 }
 
 void DenseSchur::Linearise() {
@@ -266,6 +319,7 @@ void DenseSchur::Linearise() {
       }
     }
   }
+  LineariseMotions();
 }
 
 double Damping(double diagonal, double radius) {
@@ -294,6 +348,7 @@ bool DenseSchur::Solve(double radius) {
     }
     ReducePairs(inverse, couplings, slots, count, free_poses_, scaled_.data(), blocks_.data());
   }
+  CoupleMotions();
   if (free_poses_ > 0) {
     const Eigen::Index size = 6 * static_cast<Eigen::Index>(free_poses_);
     Eigen::MatrixXd reduced(size, size);  // the lower triangle

@@ -51,10 +51,14 @@ class PointSmoother {
       SmoothBack();
       if (i < kReweightings) Reweight(ratio);
     }
+    ratio_ = ratio;
     std::vector<Point> smooth;
     for (const Step& step : steps_) smooth.push_back(step.state.row(0).transpose());
     return smooth;
   }
+
+  // After Smooth().
+  double MotionNoise() const { return ratio_ * variance_; }
 
  private:
   using State = Eigen::Matrix<double, 2, D>;  // the point, and its speed
@@ -150,6 +154,7 @@ class PointSmoother {
   std::vector<Point> points_;
   std::vector<Step> steps_;
   double variance_ = 0;  // of the noise of a point, in each coordinate
+  double ratio_ = 0;     // of the noise of acceleration over that
 };
 
 // Whether the film was cut before the pose, which has kCutSteps steps before and after that one.
@@ -193,16 +198,35 @@ void SmoothShot(std::span<const StampedPose> poses, std::vector<Rigid3>* smooth)
 
 }  // namespace
 
-std::vector<Rigid3> SmoothPath(std::span<const StampedPose> poses) {
-  DS_TRACE("smooth");
-  std::vector<Rigid3> smooth;
-  smooth.reserve(poses.size());
+std::vector<std::span<const StampedPose>> ShotsOf(std::span<const StampedPose> poses) {
+  std::vector<std::span<const StampedPose>> shots;
   for (size_t begin = 0, end = 0; begin < poses.size(); begin = end) {
     end = begin + 1;
     while (end < poses.size() && (end <= kCutSteps || end + kCutSteps >= poses.size() || !IsCut(poses, end)))
       ++end;
-    SmoothShot(poses.subspan(begin, end - begin), &smooth);
+    shots.push_back(poses.subspan(begin, end - begin));
   }
+  return shots;
+}
+
+double AccelerationNoise(std::span<const StampedPose> poses) {
+  if (poses.size() < kFewest) return 0;
+  std::vector<double> stamps_s;
+  std::vector<Eigen::Vector3d> positions;
+  for (const StampedPose& pose : poses) {
+    stamps_s.push_back(pose.timestamp_s);
+    positions.push_back(pose.world_from_cam.translation);
+  }
+  PointSmoother<3> smoother(stamps_s, std::move(positions));
+  smoother.Smooth();
+  return smoother.MotionNoise();
+}
+
+std::vector<Rigid3> SmoothPath(std::span<const StampedPose> poses) {
+  DS_TRACE("smooth");
+  std::vector<Rigid3> smooth;
+  smooth.reserve(poses.size());
+  for (const std::span<const StampedPose> shot : ShotsOf(poses)) SmoothShot(shot, &smooth);
   return smooth;
 }
 

@@ -16,4 +16,12 @@ namespace dynamic_slam {
 // order of time; fewer than 10 stay as they are.
 std::vector<Rigid3> SmoothPath(std::span<const StampedPose> poses);
 
+// The parts of the path between cuts of the film, in their order.
+std::vector<std::span<const StampedPose>> ShotsOf(std::span<const StampedPose> poses);
+
+// The spectral density of the acceleration's noise of such a path, m^2/s^3 in each coordinate (m: the path's
+// unit of length); 0 where that is not known: with fewer than 10 poses, or where they stand exactly. Over a
+// time t a velocity changes by its root times that of t.
+double AccelerationNoise(std::span<const StampedPose> poses);
+
 }  // namespace dynamic_slam

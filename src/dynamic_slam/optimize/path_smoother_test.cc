@@ -142,5 +142,46 @@ TEST(PathSmootherTest, AFewPosesStayAsTheyAreAndEqualStampsAreNoTrouble) {
   EXPECT_LT(ErrorsOf(path, SmoothPath(path), HandAt).most_position, 0.05);
 }
 
+TEST(AccelerationNoiseTest, IsThatOfTheSimulatedPath) {
+  constexpr double kNoise = 0.04, kDt = 1 / kFps;  // m^2/s^3
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    Random random(seed);
+    Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();
+    std::vector<StampedPose> path;
+    for (int i = 0; i < kFrames; ++i) {
+      const auto vector = [&] {
+        return Eigen::Vector3d(random.Gaussian(), random.Gaussian(), random.Gaussian());
+      };
+      // White noise of acceleration over a step: of the velocity, and of the position beside what that tells.
+      const Eigen::Vector3d push = std::sqrt(kNoise * kDt) * vector();
+      position += kDt * (velocity + 0.5 * push) + std::sqrt(kNoise * kDt * kDt * kDt / 12) * vector();
+      velocity += push;
+      path.push_back({i * kDt, Rigid3(Eigen::Quaterniond::Identity(), position + 0.001 * vector())});
+    }
+    EXPECT_GT(AccelerationNoise(path), 0.5 * kNoise);
+    EXPECT_LT(AccelerationNoise(path), 2 * kNoise);
+  }
+}
+
+TEST(AccelerationNoiseTest, IsNotKnownOfFewPosesOrOfACameraThatStands) {
+  const std::vector<StampedPose> path = Path(HandAt, 0.001);
+  EXPECT_EQ(AccelerationNoise(std::span(path).first(9)), 0);
+  EXPECT_EQ(AccelerationNoise(Path([](double) { return Rigid3(); }, 0)), 0);
+}
+
+TEST(ShotsOfTest, AreBetweenTheCuts) {
+  const auto cut_at_4_s = [](double t) {
+    Rigid3 pose = HandAt(t);
+    if (t >= 4) pose.translation.x() += 10;
+    return pose;
+  };
+  const std::vector<StampedPose> path = Path(cut_at_4_s, 0.001), whole = Path(HandAt, 0.001);
+  const auto shots = ShotsOf(path);
+  ASSERT_EQ(shots.size(), 2u);
+  EXPECT_EQ(shots[0].size(), 4 * kFps);
+  EXPECT_EQ(shots[0].size() + shots[1].size(), path.size());
+  EXPECT_EQ(ShotsOf(whole).size(), 1u);
+}
+
 }  // namespace
 }  // namespace dynamic_slam

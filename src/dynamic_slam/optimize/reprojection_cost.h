@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -125,6 +126,34 @@ class ReprojectionCost final : public ceres::SizedCostFunction<2, kPoseBlockSize
   const Camera* camera_;
   Eigen::Vector2d ideal_px_;
   double inverse_sigma_px_;
+};
+
+// Change of velocity over three poses, in sigmas: 3 residuals of three pose blocks.
+class MotionCost final : public ceres::SizedCostFunction<3, kPoseBlockSize, kPoseBlockSize, kPoseBlockSize> {
+ public:
+  explicit MotionCost(const std::array<double, 3>& factors) : factors_(factors) {}  // MotionFactors
+
+  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
+    Eigen::Map<Eigen::Vector3d> change(residuals);
+    change.setZero();
+    for (size_t k = 0; k < factors_.size(); ++k) {
+      const Eigen::Map<const Eigen::Quaterniond> q(parameters[k]);
+      const Eigen::Map<const Eigen::Vector3d> t(parameters[k] + 4);
+      const Eigen::Matrix3d world_from_cam = q.toRotationMatrix().transpose();
+      change -= factors_[k] * (world_from_cam * t);
+      if (jacobians == nullptr || jacobians[k] == nullptr) continue;
+      // Of the increment, then of the block.
+      Eigen::Matrix<double, 3, 6> J_increment = Eigen::Matrix<double, 3, 6>::Zero();
+      J_increment.rightCols<3>() = -factors_[k] * world_from_cam;
+      Eigen::Matrix<double, 6, 7, Eigen::RowMajor> minus;
+      PoseManifold().MinusJacobian(parameters[k], minus.data());
+      Eigen::Map<Eigen::Matrix<double, 3, 7, Eigen::RowMajor>>(jacobians[k]).noalias() = J_increment * minus;
+    }
+    return true;
+  }
+
+ private:
+  std::array<double, 3> factors_;
 };
 
 }  // namespace dynamic_slam

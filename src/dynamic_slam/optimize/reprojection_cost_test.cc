@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamic_slam/base/random.h"
+#include "dynamic_slam/optimize/bundle_solvers.h"
 
 namespace dynamic_slam {
 namespace {
@@ -168,6 +169,63 @@ TEST(ReprojectionCost, StaysFiniteBehindTheCamera) {
     ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), jacobians));
     EXPECT_TRUE(residual.allFinite() && of_pose.allFinite() && of_point.allFinite()) << "z = " << z;
     EXPECT_GT(residual.norm(), 1e3) << "z = " << z;
+  }
+}
+
+// Centres at 1, 2 and 4, after 1 and 2 s: 1 m/s all the time; the last one at 5: half a metre per second
+// more.
+TEST(MotionCostTest, IsTheChangeOfVelocityInSigmas) {
+  BundleProblem::Motion motion{{0, 1, 2}, 1, 2, 10};
+  const MotionCost cost(MotionFactors(motion));
+  Random random(5);
+  for (const double last : {4.0, 5.0}) {
+    std::vector<Pose> poses;
+    for (const double x : {1.0, 2.0, last}) {
+      const Rigid3 world_from_cam(ExpSo3(RandomVector(&random, 1.0)), {x, 0, 0});
+      const Rigid3 cam_from_world = world_from_cam.Inverse();
+      poses.emplace_back();
+      poses.back() << cam_from_world.rotation.coeffs(), cam_from_world.translation;
+    }
+    const double* parameters[] = {poses[0].data(), poses[1].data(), poses[2].data()};
+    Eigen::Vector3d residual;
+    ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), nullptr));
+    EXPECT_LT((residual - Eigen::Vector3d(10 * (last - 4) / 2, 0, 0)).norm(), 1e-9);
+  }
+}
+
+TEST(MotionCostTest, JacobiansEqualCentralDifferencesAlongTheManifold) {
+  Random random(6);
+  const PoseManifold manifold;
+  const MotionCost cost(MotionFactors({{0, 1, 2}, 0.3, 0.1, 2}));
+  std::vector<Pose> poses;
+  for (int k = 0; k < 3; ++k) poses.push_back(RandomPose(&random));
+  const auto residual_of = [&](const std::vector<Pose>& at) {
+    const double* parameters[] = {at[0].data(), at[1].data(), at[2].data()};
+    Eigen::Vector3d residual;
+    EXPECT_TRUE(cost.Evaluate(parameters, residual.data(), nullptr));
+    return residual;
+  };
+  for (size_t k = 0; k < 3; ++k) {
+    Eigen::Matrix<double, 3, 7, Eigen::RowMajor> analytic;
+    double* jacobians[] = {nullptr, nullptr, nullptr};
+    jacobians[k] = analytic.data();
+    const double* parameters[] = {poses[0].data(), poses[1].data(), poses[2].data()};
+    Eigen::Vector3d residual;
+    ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), jacobians));
+    Eigen::Matrix<double, 7, 6, Eigen::RowMajor> plus;
+    ASSERT_TRUE(manifold.PlusJacobian(poses[k].data(), plus.data()));
+    const Eigen::Matrix<double, 3, 6> along = analytic * plus;
+    for (int i = 0; i < 6; ++i) {
+      constexpr double kStep = 1e-6;
+      Eigen::Matrix<double, 6, 1> increment = Eigen::Matrix<double, 6, 1>::Zero();
+      std::vector<Pose> before = poses, after = poses;
+      increment[i] = kStep;
+      ASSERT_TRUE(manifold.Plus(poses[k].data(), increment.data(), after[k].data()));
+      increment[i] = -kStep;
+      ASSERT_TRUE(manifold.Plus(poses[k].data(), increment.data(), before[k].data()));
+      const Eigen::Vector3d numeric = (residual_of(after) - residual_of(before)) / (2 * kStep);
+      EXPECT_LT((along.col(i) - numeric).norm(), 1e-6 * (1 + numeric.norm())) << k << " " << i;
+    }
   }
 }
 

@@ -81,6 +81,7 @@ BundleSolverResult SolveSparseSchur(const Camera& camera, const BundleSolverOpti
   // One pool for each kind of object; Ceres would otherwise own, hash and free every one of them.
   std::deque<ReprojectionCost> costs;
   std::deque<WeightedHuberLoss> losses;
+  std::deque<MotionCost> motions;
   PoseManifold manifold;
   const bool is_robust = std::isfinite(options.huber_chi2);
   WeightedHuberLoss loss_of_certain(1.0, options.huber_chi2);
@@ -119,6 +120,19 @@ BundleSolverResult SolveSparseSchur(const Camera& camera, const BundleSolverOpti
     if (observation.weight != 1.0) loss = &losses.emplace_back(observation.weight, options.huber_chi2);
     ceres_problem.AddResidualBlock(
         &costs.emplace_back(camera, observation.ideal_px, observation.inverse_sigma_px), loss, pose, point);
+  }
+  for (const BundleProblem::Motion& motion : problem->motions) {
+    std::vector<double*> blocks;
+    for (const uint32_t pose : motion.poses) {
+      if (has_pose[pose] == 0) {
+        has_pose[pose] = 1;
+        ceres_problem.AddParameterBlock(poses[pose].data(), kPoseBlockSize, &manifold);
+        ordering->AddElementToGroup(poses[pose].data(), 1);
+        ceres_problem.SetParameterBlockConstant(poses[pose].data());  // what sees nothing does not move
+      }
+      blocks.push_back(poses[pose].data());
+    }
+    ceres_problem.AddResidualBlock(&motions.emplace_back(MotionFactors(motion)), nullptr, blocks);
   }
   BundleSolverResult result;
   result.usable = true;

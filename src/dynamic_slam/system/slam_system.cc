@@ -343,7 +343,6 @@ void SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& shoul
   for (int round = 0; adjusts_map && round < kViewRounds; ++round) {
     std::vector<FrameView> views;
     tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views));
-    if (views.empty()) return;  // keyframes tell all
     if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, views).usable) break;
   }
   tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));

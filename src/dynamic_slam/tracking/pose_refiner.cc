@@ -32,7 +32,7 @@ FrameView ViewOf(const Frame& frame) {
     all.push_back(
         {frame.landmarks[i], {keypoint.x, keypoint.y}, keypoint.octave, frame.StaticProbability(i)});
   }
-  FrameView view{frame.timestamp_s, frame.cam_from_world, {}};
+  FrameView view{frame.timestamp_s, PartId(), frame.cam_from_world, {}};
   const size_t count = std::min(all.size(), kMostSightings);
   for (size_t i = 0; i < count; ++i) view.sightings.push_back(all[i * all.size() / count]);
   return view;
@@ -66,7 +66,9 @@ std::vector<AnchoredPose> PoseRefiner::Refine(std::span<const AnchoredPose> know
   for (Refined& frame : refined) {
     if (!frame.pose.has_value()) continue;
     found.push_back(*frame.pose);
-    if (frame.has_view) views->push_back(std::move(frame.view));
+    if (!frame.has_view) continue;
+    frame.view.part = map_->Read()->PartOf(frame.pose->reference);
+    views->push_back(std::move(frame.view));
   }
   return found;
 }
