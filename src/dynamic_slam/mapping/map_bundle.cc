@@ -69,7 +69,7 @@ class MapBundle {
     }
   }
 
-  // After them. What carries a camera has mass (optimize/path_smoother.h).
+  // After them.
   void AddViews(const Map& map, std::span<const FrameView> views) {
     for (const FrameView& view : views) {
       const uint32_t pose = static_cast<uint32_t>(problem_.poses.size());
@@ -82,7 +82,7 @@ class MapBundle {
     }
   }
 
-  // After all poses of this run: how they follow each other.
+  // After all poses: how those of this run follow each other, as what carries a camera has mass.
   void AddMotions(const Map& map) {
     for (size_t i = 0; i < keyframes_.size(); ++i) {
       const Keyframe& keyframe = map.keyframes().At(keyframes_[i]);
@@ -130,6 +130,8 @@ class MapBundle {
   }
 
  private:
+  // Under white noise of acceleration the mean velocities over two steps differ by its density times a third
+  // of both, as variance (from the covariances in Bar-Shalom, Li, Kirubarajan 2001, 6.2.2).
   void AddMotionsOf(std::span<const StampedPose> shot, std::span<const uint32_t> poses) {
     const double noise = AccelerationNoise(shot);
     if (!(noise > 0)) return;
@@ -139,7 +141,7 @@ class MapBundle {
       motion.first_s = shot[i - 1].timestamp_s - shot[i - 2].timestamp_s;
       motion.second_s = shot[i].timestamp_s - shot[i - 1].timestamp_s;
       if (std::min(motion.first_s, motion.second_s) < kMinStep_s) continue;
-      motion.inverse_sigma = 1 / std::sqrt(0.5 * noise * (motion.first_s + motion.second_s));
+      motion.inverse_sigma = 1 / std::sqrt(noise * (motion.first_s + motion.second_s) / 3);
       problem_.motions.push_back(motion);
     }
   }

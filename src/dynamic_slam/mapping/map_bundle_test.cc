@@ -133,7 +133,7 @@ TEST(MapBundleTest, WhatCameMeanwhileMovesAlong) {
 
 // A camera that passes few points at a steady pace.
 struct Passage {
-  static constexpr int kKeyframes = 20;
+  static constexpr int kKeyframes = 24;
 
   explicit Passage(bool from_file = false) {
     for (int i = 0; i < kKeyframes; ++i) {

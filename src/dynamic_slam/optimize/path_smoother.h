@@ -20,7 +20,7 @@ std::vector<Rigid3> SmoothPath(std::span<const StampedPose> poses);
 std::vector<std::span<const StampedPose>> ShotsOf(std::span<const StampedPose> poses);
 
 // The spectral density of the acceleration's noise of such a path, m^2/s^3 in each coordinate (m: the path's
-// unit of length); 0 where that is not known: with fewer than 10 poses, or where they stand exactly. Over a
+// unit of length); 0 where that is not known: with fewer than 20 poses, or where they stand exactly. Over a
 // time t a velocity changes by its root times that of t.
 double AccelerationNoise(std::span<const StampedPose> poses);
 

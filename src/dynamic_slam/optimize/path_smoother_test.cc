@@ -165,7 +165,7 @@ TEST(AccelerationNoiseTest, IsThatOfTheSimulatedPath) {
 
 TEST(AccelerationNoiseTest, IsNotKnownOfFewPosesOrOfACameraThatStands) {
   const std::vector<StampedPose> path = Path(HandAt, 0.001);
-  EXPECT_EQ(AccelerationNoise(std::span(path).first(9)), 0);
+  EXPECT_EQ(AccelerationNoise(std::span(path).first(19)), 0);
   EXPECT_EQ(AccelerationNoise(Path([](double) { return Rigid3(); }, 0)), 0);
 }
 
