@@ -334,7 +334,7 @@ BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
     bundle = WholeBundle(*locked);
     if (path.has_value()) {
       bundle->AddViews(*locked, *path);
-      bundle->AddMotions(*locked);
+      if (options.motion_prior) bundle->AddMotions(*locked);
     }
   }
   return SolveAndWriteBack(camera, options.final_bundle, should_stop, &*bundle, map);

@@ -21,8 +21,10 @@ namespace dynamic_slam {
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
                           uint32_t epoch, const std::function<bool()>& should_stop, SharedMap* map);
 
-// The same of the whole map, the origin of each part fixed. Frames that see it help to tell where it is: of
-// those, only what they say of keyframes and landmarks is written back.
+// The same of the whole map, the origin of each part fixed. path: when the sequence is over, the frames
+// between keyframes that see the map help to tell where it is, and so does the motion of all
+// (MapperOptions::motion_prior); of these frames, only what they say of keyframes and landmarks is written
+// back.
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
                         const std::function<bool()>& should_stop, SharedMap* map,
                         std::optional<std::span<const FrameView>> path = {});

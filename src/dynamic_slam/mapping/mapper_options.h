@@ -14,6 +14,7 @@ struct MapperOptions {
   int fixed_keyframes = 40;
   double redundant_ratio = 0.9;
   int interrupting_keyframes = 1;
+  bool motion_prior = true;
   // With half the steps the scale drifts among people: that is what a bundle finds last.
   BundleOptions local_bundle{.max_iterations = 10};
   BundleOptions final_bundle{.max_iterations = 20, .refine_iterations = 20, .function_tolerance = 1e-5};
@@ -44,6 +45,12 @@ struct MapperOptions {
                     "A keyframe is culled when this part of its landmarks is seen as well by three others."});
     visit("interrupting_keyframes", self.interrupting_keyframes,
           OptionField{"", 1, 1000, "Local bundle adjustment ends early when so many keyframes wait."});
+    visit(
+        "motion_prior", self.motion_prior,
+        OptionField{"", 0, 1,
+                    "Offline, when the map is adjusted to all frames: what carries a camera has mass, so its "
+                    "velocity changes by little from one keyframe to the next. How little, the path itself "
+                    "tells."});
     visit("local_bundle", self.local_bundle);
     visit("final_bundle", self.final_bundle);
   }
