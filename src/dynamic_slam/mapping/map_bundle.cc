@@ -22,6 +22,39 @@ constexpr size_t kRefreshedAtOnce = 100;
 // Between images that are nearer in time nobody knows how fast a camera is.
 constexpr double kMinStep_s = 1e-3;
 
+// Of each pose but the first: the camera's orientation halfway to it, world from camera.
+std::vector<Eigen::Matrix3d> StepOrientations(std::span<const StampedPose> shot) {
+  std::vector<Eigen::Matrix3d> orientations(shot.size());
+  for (size_t i = 1; i < shot.size(); ++i) {
+    orientations[i] =
+        shot[i - 1].world_from_cam.rotation.slerp(0.5, shot[i].world_from_cam.rotation).toRotationMatrix();
+  }
+  return orientations;
+}
+
+// The path of a camera that thinks that it never turns.
+Trajectory Unrolled(std::span<const StampedPose> shot) {
+  const std::vector<Eigen::Matrix3d> world_from_step = StepOrientations(shot);
+  Trajectory unrolled(shot.begin(), shot.end());
+  for (size_t i = 1; i < shot.size(); ++i) {
+    const Eigen::Vector3d step = shot[i].world_from_cam.translation - shot[i - 1].world_from_cam.translation;
+    unrolled[i].world_from_cam.translation =
+        unrolled[i - 1].world_from_cam.translation + world_from_step[i].transpose() * step;
+  }
+  return unrolled;
+}
+
+// Of velocities in the world or, where these change less, as a car's do in a curve, of those that the camera
+// itself has. The largest of the shots'.
+MotionNoise NoiseOf(std::span<const std::span<const StampedPose>> shots) {
+  double in_world = 0, in_camera = 0;
+  for (const std::span<const StampedPose> shot : shots) {
+    in_world = std::max(in_world, AccelerationNoise(shot));
+    in_camera = std::max(in_camera, AccelerationNoise(Unrolled(shot)));
+  }
+  return {std::min(in_world, in_camera), in_camera < in_world};
+}
+
 // A bundle problem made of parts of the map, and the way back.
 class MapBundle {
  public:
@@ -82,8 +115,9 @@ class MapBundle {
     }
   }
 
-  // After all poses: how those of this run follow each other, as what carries a camera has mass.
-  void AddMotions(const Map& map) {
+  // After all poses: how those of this run follow each other, as what carries a camera has mass. noise: of
+  // each part of the map; of those that it lacks it is measured.
+  void AddMotions(const Map& map, std::map<PartId, MotionNoise>* noise) {
     for (size_t i = 0; i < keyframes_.size(); ++i) {
       const Keyframe& keyframe = map.keyframes().At(keyframes_[i]);
       const bool is_from_file = !keyframe.frame_id().IsValid();
@@ -97,9 +131,13 @@ class MapBundle {
         poses.push_back(pose);
       }
       if (!HoldScale(map, part)) continue;
+      const auto shots = ShotsOf(trajectory);
+      MotionNoise& of_part = (*noise)[part];
+      if (of_part.density == 0) of_part = NoiseOf(shots);
+      if (!(of_part.density > 0)) continue;
       size_t first = 0;
-      for (const std::span<const StampedPose> shot : ShotsOf(trajectory)) {
-        AddMotionsOf(shot, std::span(poses).subspan(first, shot.size()));
+      for (const std::span<const StampedPose> shot : shots) {
+        AddMotionsOf(shot, std::span(poses).subspan(first, shot.size()), of_part);
         first += shot.size();
       }
     }
@@ -132,16 +170,17 @@ class MapBundle {
  private:
   // Under white noise of acceleration the mean velocities over two steps differ by its density times a third
   // of both, as variance (from the covariances in Bar-Shalom, Li, Kirubarajan 2001, 6.2.2).
-  void AddMotionsOf(std::span<const StampedPose> shot, std::span<const uint32_t> poses) {
-    const double noise = AccelerationNoise(shot);
-    if (!(noise > 0)) return;
+  void AddMotionsOf(std::span<const StampedPose> shot, std::span<const uint32_t> poses,
+                    const MotionNoise& noise) {
+    const std::vector<Eigen::Matrix3d> world_from_step = StepOrientations(shot);
     for (size_t i = 2; i < shot.size(); ++i) {
       BundleProblem::Motion motion;
       motion.poses = {poses[i - 2], poses[i - 1], poses[i]};
       motion.first_s = shot[i - 1].timestamp_s - shot[i - 2].timestamp_s;
       motion.second_s = shot[i].timestamp_s - shot[i - 1].timestamp_s;
       if (std::min(motion.first_s, motion.second_s) < kMinStep_s) continue;
-      motion.inverse_sigma = 1 / std::sqrt(noise * (motion.first_s + motion.second_s) / 3);
+      motion.inverse_sigma = 1 / std::sqrt(noise.density * (motion.first_s + motion.second_s) / 3);
+      if (noise.is_in_camera) motion.turn = world_from_step[i] * world_from_step[i - 1].transpose();
       problem_.motions.push_back(motion);
     }
   }
@@ -324,17 +363,16 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 }
 
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
-                        const std::function<bool()>& should_stop, SharedMap* map,
-                        std::optional<std::span<const FrameView>> path) {
+                        const std::function<bool()>& should_stop, SharedMap* map, const PathEvidence* path) {
   DS_TRACE("mapping/adjust all");
   std::optional<MapBundle> bundle;
   {
     const auto locked = map->Read();
     if (locked->keyframes().size() < 2) return {};
     bundle = WholeBundle(*locked);
-    if (path.has_value()) {
-      bundle->AddViews(*locked, *path);
-      if (options.motion_prior) bundle->AddMotions(*locked);
+    if (path != nullptr) {
+      bundle->AddViews(*locked, path->views);
+      if (options.motion_prior) bundle->AddMotions(*locked, path->noise);
     }
   }
   return SolveAndWriteBack(camera, options.final_bundle, should_stop, &*bundle, map);

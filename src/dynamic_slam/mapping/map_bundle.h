@@ -1,7 +1,7 @@
 #pragma once
 
 #include <functional>
-#include <optional>
+#include <map>
 #include <span>
 
 #include "dynamic_slam/geometry/camera.h"
@@ -21,12 +21,25 @@ namespace dynamic_slam {
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
                           uint32_t epoch, const std::function<bool()>& should_stop, SharedMap* map);
 
-// The same of the whole map, the origin of each part fixed. path: when the sequence is over, the frames
-// between keyframes that see the map help to tell where it is, and so does the motion of all
-// (MapperOptions::motion_prior); of these frames, only what they say of keyframes and landmarks is written
-// back.
+// How much the velocity of what carries a camera changes in a part of the map: the density of white noise of
+// its acceleration, unit of the map^2/s^3; 0 where it is not known.
+struct MotionNoise {
+  double density = 0;
+  bool is_in_camera =
+      false;  // the velocity as the camera has it, which turns with it; else as the world has it
+};
+
+// When the sequence is over: what tells where the map is beside its keyframes.
+struct PathEvidence {
+  std::span<const FrameView> views;      // frames between keyframes
+  std::map<PartId, MotionNoise>* noise;  // measured where it is not there yet: later, the path knows of it
+};
+
+// The same of the whole map, the origin of each part fixed. With `path` its frames help to tell where the map
+// is, and so does the motion of all (MapperOptions::motion_prior); of these frames, only what they say of
+// keyframes and landmarks is written back.
 BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
                         const std::function<bool()>& should_stop, SharedMap* map,
-                        std::optional<std::span<const FrameView>> path = {});
+                        const PathEvidence* path = nullptr);
 
 }  // namespace dynamic_slam

@@ -13,8 +13,6 @@ namespace {
 
 using testing::IsEmpty;
 
-constexpr std::span<const FrameView> kKeyframesOnly;
-
 TEST(MapBundleTest, FindsTheTruthAndBreaksWrongLinks) {
   SyntheticWorld world(400, 0.01);
   SyntheticMap scene(&world);
@@ -87,7 +85,9 @@ TEST(MapBundleTest, FramesThatSeeTheMapTellWhereItIs) {
       }
       views.push_back(view);
     }
-    EXPECT_TRUE(AdjustAll(world.camera(), {}, {}, &scene.shared_map, views).usable);
+    std::map<PartId, MotionNoise> noise;
+    const PathEvidence path{views, &noise};
+    EXPECT_TRUE(AdjustAll(world.camera(), {}, {}, &scene.shared_map, &path).usable);
     EXPECT_THAT(scene.map.Validate(), IsEmpty());
     const auto centre = [&](size_t i) { return scene.map.keyframes().At(ids[i]).CenterInWorld(); };
     // The scale is free: halfway is halfway.
@@ -146,8 +146,9 @@ struct Passage {
     scene.AddLandmarks(0, 79, ids);
   }
 
-  BundleSummary Adjust(std::optional<std::span<const FrameView>> path) {
-    return AdjustAll(world.camera(), {}, {}, &scene.shared_map, path);
+  BundleSummary Adjust(bool with_path) {
+    const PathEvidence path{{}, &noise};
+    return AdjustAll(world.camera(), {}, {}, &scene.shared_map, with_path ? &path : nullptr);
   }
   Eigen::Vector3d Centre(int i) const {
     return scene.map.keyframes().At(ids[static_cast<size_t>(i)]).CenterInWorld();
@@ -164,28 +165,51 @@ struct Passage {
   SyntheticWorld world{80, 1.0};
   SyntheticMap scene{&world};
   std::vector<KeyframeId> ids;
+  std::map<PartId, MotionNoise> noise;
 };
 
 TEST(MapBundleTest, WhatCarriesACameraHasMass) {
   Passage each_for_itself, path;
-  EXPECT_TRUE(each_for_itself.Adjust({}).usable);
-  EXPECT_TRUE(path.Adjust(kKeyframesOnly).usable);
+  EXPECT_TRUE(each_for_itself.Adjust(false).usable);
+  EXPECT_TRUE(path.Adjust(true).usable);
   EXPECT_LT(path.Error(), 0.5 * each_for_itself.Error()) << each_for_itself.Error();
   EXPECT_THAT(path.scene.map.Validate(), IsEmpty());
+}
+
+// A car in a curve is steady as it feels it itself; one that turns while it drives straight on is not.
+TEST(MapBundleTest, NoiseIsOfTheVelocityThatChangesLess) {
+  for (const bool is_car : {true, false}) {
+    SyntheticWorld world(400);
+    SyntheticMap scene(&world);
+    std::vector<KeyframeId> ids;
+    for (int i = 0; i < 24; ++i) {
+      const double angle = 0.02 * i;
+      const Eigen::Vector3d centre =
+          is_car ? Eigen::Vector3d(1 - std::cos(angle), 0, std::sin(angle)) : Eigen::Vector3d(0, 0, angle);
+      ids.push_back(scene.Add(Rigid3(ExpSo3({0, angle, 0}), centre).Inverse()));
+    }
+    scene.AddLandmarks(0, 399, ids);
+    std::map<PartId, MotionNoise> noise;
+    const PathEvidence path{{}, &noise};
+    EXPECT_TRUE(AdjustAll(world.camera(), {}, {}, &scene.shared_map, &path).usable);
+    ASSERT_EQ(noise.size(), 1u);
+    EXPECT_GT(noise.begin()->second.density, 0);
+    EXPECT_EQ(noise.begin()->second.is_in_camera, is_car);
+  }
 }
 
 // A map that shrinks would be one of a slower camera.
 TEST(MapBundleTest, APathKeepsItsLength) {
   Passage path;
-  EXPECT_TRUE(path.Adjust(kKeyframesOnly).usable);
+  EXPECT_TRUE(path.Adjust(true).usable);
   EXPECT_NEAR((path.Centre(Passage::kKeyframes - 1) - path.Centre(0)).norm(),
               Passage::kStep * (Passage::kKeyframes - 1), 0.1 * Passage::kStep * Passage::kKeyframes);
 }
 
 TEST(MapBundleTest, KeyframesOfAFileAreNoPathOfThisRun) {
   Passage each_for_itself(true), path(true);
-  EXPECT_TRUE(each_for_itself.Adjust({}).usable);
-  EXPECT_TRUE(path.Adjust(kKeyframesOnly).usable);
+  EXPECT_TRUE(each_for_itself.Adjust(false).usable);
+  EXPECT_TRUE(path.Adjust(true).usable);
   EXPECT_EQ(path.Error(), each_for_itself.Error());
 }
 

@@ -33,11 +33,12 @@ struct BundleProblem {
   };
 
   // Of three poses, one after the other: what carries a camera has mass, so its mean velocity from the first
-  // to the second is nearly that from the second to the third.
+  // to the second, turned along, is nearly that from the second to the third.
   struct Motion {
-    std::array<uint32_t, 3> poses{};   // indices in poses
-    double first_s = 0, second_s = 0;  // the times between them
-    double inverse_sigma = 1;  // 1 / (standard deviation of the change of velocity), s per unit of the map
+    std::array<uint32_t, 3> poses{};                     // indices in poses
+    double first_s = 0, second_s = 0;                    // the times between them
+    double inverse_sigma = 1;                            // 1 / (standard deviation of the change of velocity)
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  // of the velocity between the steps, in the world
   };
 
   std::vector<Pose> poses;

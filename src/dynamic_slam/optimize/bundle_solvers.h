@@ -18,9 +18,10 @@ inline double HuberLoss(double squared_error, double chi2) {
   return squared_error <= chi2 ? squared_error : 2 * std::sqrt(chi2 * squared_error) - chi2;
 }
 
-// The change of velocity, in sigmas, is the sum of the camera's centres times these.
-inline std::array<double, 3> MotionFactors(const BundleProblem::Motion& motion) {
-  const double first = motion.inverse_sigma / motion.first_s, second = motion.inverse_sigma / motion.second_s;
+// The change of velocity, in sigmas, is the sum of these times the camera's centres.
+inline std::array<Eigen::Matrix3d, 3> MotionFactors(const BundleProblem::Motion& motion) {
+  const Eigen::Matrix3d first = motion.inverse_sigma / motion.first_s * motion.turn;
+  const Eigen::Matrix3d second = motion.inverse_sigma / motion.second_s * Eigen::Matrix3d::Identity();
   return {first, -first - second, second};
 }
 

@@ -37,7 +37,7 @@ double Cost(const BundleProblem& problem, double huber_chi2) {
       return problem.poses[motion.poses[k]].cam_from_world.TargetOriginInSource();
     };
     const Eigen::Vector3d change =
-        (centre(2) - centre(1)) / motion.second_s - (centre(1) - centre(0)) / motion.first_s;
+        (centre(2) - centre(1)) / motion.second_s - motion.turn * (centre(1) - centre(0)) / motion.first_s;
     cost += 0.5 * (motion.inverse_sigma * change).squaredNorm();
   }
   return cost;
@@ -63,11 +63,13 @@ TEST_P(BundleSolversTest, BothFindTheSameMinimum) {
     problem.poses[4].fixed = true;
     // Of every second pose from one of the fixed on.
     for (uint32_t i = 1; i + 4 < problem.poses.size(); ++i) {
-      problem.motions.push_back({{i, i + 2, i + 4}, 0.1, random.Uniform(0.05, 0.2), random.Uniform(1, 20)});
+      BundleProblem::Motion motion{{i, i + 2, i + 4}, 0.1, random.Uniform(0.05, 0.2), random.Uniform(1, 20)};
+      motion.turn = ExpSo3(GaussianVector(&random, 0.1)).toRotationMatrix();
+      problem.motions.push_back(motion);
     }
     BundleSolverOptions options;
     options.huber_chi2 = huber_chi2;
-    options.max_iterations = 100;
+    options.max_iterations = 300;
     options.function_tolerance = 1e-12;
     const Solved dense = Solve(SolveDenseSchur, problem, options);
     const Solved sparse = Solve(SolveSparseSchur, problem, options);

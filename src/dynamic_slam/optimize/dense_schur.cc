@@ -227,7 +227,7 @@ double DenseSchur::Cost(const std::vector<PoseValue>& poses,
 
 Eigen::Vector3d DenseSchur::ChangeOfVelocity(const BundleProblem::Motion& motion,
                                              const std::vector<PoseValue>& poses) const {
-  const std::array<double, 3> factors = MotionFactors(motion);
+  const std::array<Eigen::Matrix3d, 3> factors = MotionFactors(motion);
   Eigen::Vector3d change = Eigen::Vector3d::Zero();
   for (size_t k = 0; k < factors.size(); ++k) {
     const PoseValue& pose = poses[motion.poses[k]];
@@ -240,27 +240,28 @@ Eigen::Vector3d DenseSchur::ChangeOfVelocity(const BundleProblem::Motion& motion
 // is.
 void DenseSchur::LineariseMotions() {
   for (const BundleProblem::Motion& motion : problem_->motions) {
-    const std::array<double, 3> factors = MotionFactors(motion);
+    const std::array<Eigen::Matrix3d, 3> factors = MotionFactors(motion);
     const Eigen::Vector3d change = ChangeOfVelocity(motion, poses_);
     for (size_t k = 0; k < factors.size(); ++k) {
       const uint32_t slot = slot_of_pose_[motion.poses[k]];
       if (slot == kFixed) continue;
-      for (int i = 3; i < 6; ++i) pose_hessians_[36 * slot + 7 * i] += factors[k] * factors[k];
-      pose_gradient_.segment<3>(6 * slot + 3) -= factors[k] * (poses_[motion.poses[k]].matrix * change);
+      const Eigen::Matrix3d along = factors[k] * poses_[motion.poses[k]].matrix.transpose();
+      Eigen::Map<Eigen::Matrix<double, 6, 6>>(&pose_hessians_[36 * slot]).bottomRightCorner<3, 3>() +=
+          along.transpose() * along;
+      pose_gradient_.segment<3>(6 * slot + 3) -= along.transpose() * change;
     }
   }
 }
 
 void DenseSchur::CoupleMotions() {
   for (const BundleProblem::Motion& motion : problem_->motions) {
-    const std::array<double, 3> factors = MotionFactors(motion);
+    const std::array<Eigen::Matrix3d, 3> factors = MotionFactors(motion);
     for (size_t k = 0; k < factors.size(); ++k) {
       for (size_t l = 0; l < factors.size(); ++l) {
         const uint32_t a = slot_of_pose_[motion.poses[k]], b = slot_of_pose_[motion.poses[l]];
         if (a >= b || b == kFixed) continue;
-        const Eigen::Matrix3d coupling =
-            factors[k] * factors[l] *
-            (poses_[motion.poses[k]].matrix * poses_[motion.poses[l]].matrix.transpose());
+        const Eigen::Matrix3d coupling = poses_[motion.poses[k]].matrix * factors[k].transpose() *
+                                         factors[l] * poses_[motion.poses[l]].matrix.transpose();
         double* block = &blocks_[(static_cast<size_t>(a) * free_poses_ + b) * kPoseBlock];
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) block[(3 + i) * kRow + 3 + j] += coupling(i, j);

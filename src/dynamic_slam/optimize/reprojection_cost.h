@@ -131,7 +131,7 @@ class ReprojectionCost final : public ceres::SizedCostFunction<2, kPoseBlockSize
 // Change of velocity over three poses, in sigmas: 3 residuals of three pose blocks.
 class MotionCost final : public ceres::SizedCostFunction<3, kPoseBlockSize, kPoseBlockSize, kPoseBlockSize> {
  public:
-  explicit MotionCost(const std::array<double, 3>& factors) : factors_(factors) {}  // MotionFactors
+  explicit MotionCost(const std::array<Eigen::Matrix3d, 3>& factors) : factors_(factors) {}  // MotionFactors
 
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     Eigen::Map<Eigen::Vector3d> change(residuals);
@@ -144,7 +144,7 @@ class MotionCost final : public ceres::SizedCostFunction<3, kPoseBlockSize, kPos
       if (jacobians == nullptr || jacobians[k] == nullptr) continue;
       // Of the increment, then of the block.
       Eigen::Matrix<double, 3, 6> J_increment = Eigen::Matrix<double, 3, 6>::Zero();
-      J_increment.rightCols<3>() = -factors_[k] * world_from_cam;
+      J_increment.rightCols<3>().noalias() = -factors_[k] * world_from_cam;
       Eigen::Matrix<double, 6, 7, Eigen::RowMajor> minus;
       PoseManifold().MinusJacobian(parameters[k], minus.data());
       Eigen::Map<Eigen::Matrix<double, 3, 7, Eigen::RowMajor>>(jacobians[k]).noalias() = J_increment * minus;
@@ -153,7 +153,7 @@ class MotionCost final : public ceres::SizedCostFunction<3, kPoseBlockSize, kPos
   }
 
  private:
-  std::array<double, 3> factors_;
+  std::array<Eigen::Matrix3d, 3> factors_;
 };
 
 }  // namespace dynamic_slam

@@ -1,5 +1,7 @@
 #include "dynamic_slam/optimize/reprojection_cost.h"
 
+#include <numbers>
+
 #include <ceres/manifold_test_utils.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -193,10 +195,26 @@ TEST(MotionCostTest, IsTheChangeOfVelocityInSigmas) {
   }
 }
 
+// A quarter of a circle in each step: the velocity turns along.
+TEST(MotionCostTest, ASteadyCurveHasNoChangeOfVelocity) {
+  BundleProblem::Motion motion{{0, 1, 2}, 1, 1, 10};
+  motion.turn = ExpSo3({0, 0, 0.5 * std::numbers::pi}).toRotationMatrix();
+  const MotionCost cost(MotionFactors(motion));
+  std::vector<Pose> poses;
+  for (const Eigen::Vector3d& centre : {Eigen::Vector3d(1, 0, 0), {0, 1, 0}, {-1, 0, 0}}) {
+    poses.emplace_back();
+    poses.back() << Eigen::Quaterniond::Identity().coeffs(), -centre;
+  }
+  const double* parameters[] = {poses[0].data(), poses[1].data(), poses[2].data()};
+  Eigen::Vector3d residual;
+  ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), nullptr));
+  EXPECT_LT(residual.norm(), 1e-9);
+}
+
 TEST(MotionCostTest, JacobiansEqualCentralDifferencesAlongTheManifold) {
   Random random(6);
   const PoseManifold manifold;
-  const MotionCost cost(MotionFactors({{0, 1, 2}, 0.3, 0.1, 2}));
+  const MotionCost cost(MotionFactors({{0, 1, 2}, 0.3, 0.1, 2, ExpSo3({0.1, 0.3, -0.2}).toRotationMatrix()}));
   std::vector<Pose> poses;
   for (int k = 0; k < 3; ++k) poses.push_back(RandomPose(&random));
   const auto residual_of = [&](const std::vector<Pose>& at) {

@@ -340,10 +340,12 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
 }
 
 void SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& should_stop) {
+  std::map<PartId, MotionNoise> noise;
   for (int round = 0; adjusts_map && round < kViewRounds; ++round) {
     std::vector<FrameView> views;
     tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views));
-    if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, views).usable) break;
+    const PathEvidence path{views, &noise};
+    if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, &path).usable) break;
   }
   tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
 }
