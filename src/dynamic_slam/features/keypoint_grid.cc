@@ -25,16 +25,15 @@ void KeypointGrid::Build(const FeatureSet& features, const std::array<double, 4>
     ++cell_begin_[cell_of_[i]];
   }
   filled_.resize(cells);
-  size_t filled = 0;
+  filled_count_ = 0;
   uint32_t end = 0;
   for (uint32_t cell = 0; cell < cells; ++cell) {
-    filled_[filled] = cell;
-    filled += cell_begin_[cell] > 0 ? 1 : 0;
+    filled_[filled_count_] = cell;
+    filled_count_ += cell_begin_[cell] > 0 ? 1 : 0;
     end += cell_begin_[cell];
     cell_begin_[cell] = end;
   }
   cell_begin_[cells] = end;
-  filled_.resize(filled);
   const size_t padded = count + kLanes - 1;
   x_.resize(padded);
   y_.resize(padded);

@@ -32,7 +32,8 @@ class KeypointGrid {
   // Calls fn(std::span<const uint32_t> indices) for each cell that has keypoints, row-major.
   template <class Fn>
   void ForEachCell(Fn&& fn) const {
-    for (const uint32_t cell : filled_) {
+    for (size_t k = 0; k < filled_count_; ++k) {
+      const uint32_t cell = filled_[k];
       const uint32_t begin = cell_begin_[cell], end = cell_begin_[cell + 1];
       fn(std::span(index_.data() + begin, end - begin));
     }
@@ -190,7 +191,8 @@ class KeypointGrid {
   float min_x_ = 0, min_y_ = 0;
   int columns_ = 0, rows_ = 0;
   std::vector<uint32_t> cell_begin_;  // columns * rows + 1
-  std::vector<uint32_t> filled_;      // cells that have keypoints
+  std::vector<uint32_t> filled_;      // the first filled_count_: cells that have keypoints
+  size_t filled_count_ = 0;           // so that copies are of one size and need no memory anew
   // Of the keypoints, cell by cell, and kLanes - 1 more that are nobody's.
   std::vector<float> x_, y_;  // ideal px
   std::vector<int32_t> octave_;
