@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -130,11 +129,10 @@ class MapBundle {
         trajectory.push_back({stamp, problem_.poses[pose].cam_from_world.Inverse()});
         poses.push_back(pose);
       }
-      if (!HoldScale(map, part)) continue;
       const auto shots = ShotsOf(trajectory);
       MotionNoise& of_part = (*noise)[part];
       if (of_part.density == 0) of_part = NoiseOf(shots);
-      if (!(of_part.density > 0)) continue;
+      if (!(of_part.density > 0) || !HoldScale(map, part)) continue;
       size_t first = 0;
       for (const std::span<const StampedPose> shot : shots) {
         AddMotionsOf(shot, std::span(poses).subspan(first, shot.size()), of_part);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr size_t kFewest = 10;
 
-// Of 600 simulated paths of so many poses, none had a noise of acceleration that was found less than a tenth of
-// what it was; of as many of 10 poses, one in fifty had next to none.
+// Of 600 simulated paths of so many poses, none had a noise of acceleration that was found less than a tenth
+// of what it was; of as many of 10 poses, one in fifty had next to none.
 constexpr size_t kFewestForNoise = 20;
 
 // Degrees of freedom of Student's distribution: heavy tails that still have a variance.
@@ -180,21 +180,30 @@ bool IsCut(std::span<const StampedPose> poses, size_t i) {
   return speed > kCutRatio * fastest || turn > kCutRatio * fastest_turn;
 }
 
+std::vector<double> StampsOf(std::span<const StampedPose> poses) {
+  std::vector<double> stamps_s;
+  for (const StampedPose& pose : poses) stamps_s.push_back(pose.timestamp_s);
+  return stamps_s;
+}
+
+std::vector<Eigen::Vector3d> PositionsOf(std::span<const StampedPose> poses) {
+  std::vector<Eigen::Vector3d> positions;
+  for (const StampedPose& pose : poses) positions.push_back(pose.world_from_cam.translation);
+  return positions;
+}
+
 // Without cuts.
 void SmoothShot(std::span<const StampedPose> poses, std::vector<Rigid3>* smooth) {
   const size_t first = smooth->size();
   for (const StampedPose& pose : poses) smooth->push_back(pose.world_from_cam);
   if (poses.size() < kFewest) return;
-  std::vector<double> stamps_s;
-  std::vector<Eigen::Vector3d> positions;
+  const std::vector<double> stamps_s = StampsOf(poses);
   std::vector<Eigen::Vector4d> orientations;  // of a quaternion and its negative, the nearer to the last
   for (const StampedPose& pose : poses) {
-    stamps_s.push_back(pose.timestamp_s);
-    positions.push_back(pose.world_from_cam.translation);
     const Eigen::Vector4d q = pose.world_from_cam.rotation.coeffs();
     orientations.push_back(!orientations.empty() && q.dot(orientations.back()) < 0 ? Eigen::Vector4d(-q) : q);
   }
-  positions = PointSmoother<3>(stamps_s, std::move(positions)).Smooth();
+  const std::vector<Eigen::Vector3d> positions = PointSmoother<3>(stamps_s, PositionsOf(poses)).Smooth();
   orientations = PointSmoother<4>(stamps_s, std::move(orientations)).Smooth();
   for (size_t i = 0; i < poses.size(); ++i)
     (*smooth)[first + i] = Rigid3(Eigen::Quaterniond(orientations[i]), positions[i]);
@@ -215,13 +224,7 @@ std::vector<std::span<const StampedPose>> ShotsOf(std::span<const StampedPose> p
 
 double AccelerationNoise(std::span<const StampedPose> poses) {
   if (poses.size() < kFewestForNoise) return 0;
-  std::vector<double> stamps_s;
-  std::vector<Eigen::Vector3d> positions;
-  for (const StampedPose& pose : poses) {
-    stamps_s.push_back(pose.timestamp_s);
-    positions.push_back(pose.world_from_cam.translation);
-  }
-  PointSmoother<3> smoother(stamps_s, std::move(positions));
+  PointSmoother<3> smoother(StampsOf(poses), PositionsOf(poses));
   smoother.Smooth();
   return smoother.MotionNoise();
 }

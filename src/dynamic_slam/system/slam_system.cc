@@ -344,6 +344,7 @@ void SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& shoul
   for (int round = 0; adjusts_map && round < kViewRounds; ++round) {
     std::vector<FrameView> views;
     tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views));
+    if (views.empty() && !options_.mapper.motion_prior) return;  // keyframes tell all
     const PathEvidence path{views, &noise};
     if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, &path).usable) break;
   }

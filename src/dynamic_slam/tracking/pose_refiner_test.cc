@@ -108,6 +108,7 @@ TEST_F(PoseRefinerTest, ViewsAreWhatEveryThirdFrameBetweenKeyframesSeesOfTheMap)
   for (const FrameView& view : views) {
     const double centre = view.cam_from_world.TargetOriginInSource().x();
     EXPECT_NEAR(centre, view.timestamp_s, 0.005);
+    EXPECT_EQ(view.part, PartId(0));
     EXPECT_GE(view.sightings.size(), static_cast<size_t>(kMinInliers));
     for (const FrameView::Sighting& sighting : view.sightings) {
       const Landmark& landmark = scene_.map.landmarks().At(sighting.landmark);
