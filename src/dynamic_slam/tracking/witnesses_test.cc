@@ -82,6 +82,13 @@ TEST_F(WitnessesTest, OnlyCandidates) {
   EXPECT_THAT(Choose(), ::testing::ElementsAre(2));
 }
 
+TEST_F(WitnessesTest, TheStrongestCornerWhereNothingIsKnownOfTheLastFrame) {
+  Add(2, 2, 50);
+  Add(3, 9, 60);
+  last_keypoints_.assign(2, kNotFollowed);
+  EXPECT_THAT(Choose(), ::testing::ElementsAre(1));
+}
+
 TEST_F(WitnessesTest, TheFirstOfEquals) {
   Add(2, 2, 50);
   Add(3, 9, 60);
