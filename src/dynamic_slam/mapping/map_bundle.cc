@@ -1,7 +1,6 @@
 #include "dynamic_slam/mapping/map_bundle.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
@@ -17,42 +16,6 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 // Landmarks that are refreshed before others may look at the map again.
 constexpr size_t kRefreshedAtOnce = 100;
-
-// Between images that are nearer in time nobody knows how fast a camera is.
-constexpr double kMinStep_s = 1e-3;
-
-// Of each pose but the first: the camera's orientation halfway to it, world from camera.
-std::vector<Eigen::Matrix3d> StepOrientations(std::span<const StampedPose> shot) {
-  std::vector<Eigen::Matrix3d> orientations(shot.size());
-  for (size_t i = 1; i < shot.size(); ++i) {
-    orientations[i] =
-        shot[i - 1].world_from_cam.rotation.slerp(0.5, shot[i].world_from_cam.rotation).toRotationMatrix();
-  }
-  return orientations;
-}
-
-// The path of a camera that thinks that it never turns.
-Trajectory Unrolled(std::span<const StampedPose> shot) {
-  const std::vector<Eigen::Matrix3d> world_from_step = StepOrientations(shot);
-  Trajectory unrolled(shot.begin(), shot.end());
-  for (size_t i = 1; i < shot.size(); ++i) {
-    const Eigen::Vector3d step = shot[i].world_from_cam.translation - shot[i - 1].world_from_cam.translation;
-    unrolled[i].world_from_cam.translation =
-        unrolled[i - 1].world_from_cam.translation + world_from_step[i].transpose() * step;
-  }
-  return unrolled;
-}
-
-// Of velocities in the world or, where these change less, as a car's do in a curve, of those that the camera
-// itself has. The largest of the shots'.
-MotionNoise NoiseOf(std::span<const std::span<const StampedPose>> shots) {
-  double in_world = 0, in_camera = 0;
-  for (const std::span<const StampedPose> shot : shots) {
-    in_world = std::max(in_world, AccelerationNoise(shot));
-    in_camera = std::max(in_camera, AccelerationNoise(Unrolled(shot)));
-  }
-  return {std::min(in_world, in_camera), in_camera < in_world};
-}
 
 // A bundle problem made of parts of the map, and the way back.
 class MapBundle {
@@ -116,7 +79,7 @@ class MapBundle {
 
   // After all poses: how those of this run follow each other, as what carries a camera has mass. noise: of
   // each part of the map; of those that it lacks it is measured.
-  void AddMotions(const Map& map, std::map<PartId, MotionNoise>* noise) {
+  void AddMotions(const Map& map, MotionNoises* noise) {
     for (size_t i = 0; i < keyframes_.size(); ++i) {
       const Keyframe& keyframe = map.keyframes().At(keyframes_[i]);
       const bool is_from_file = !keyframe.frame_id().IsValid();
@@ -135,7 +98,7 @@ class MapBundle {
       if (!(of_part.density > 0) || !HoldScale(map, part)) continue;
       size_t first = 0;
       for (const std::span<const StampedPose> shot : shots) {
-        AddMotionsOf(shot, std::span(poses).subspan(first, shot.size()), of_part);
+        AppendMotions(shot, std::span(poses).subspan(first, shot.size()), of_part, &problem_.motions);
         first += shot.size();
       }
     }
@@ -166,23 +129,6 @@ class MapBundle {
   }
 
  private:
-  // Under white noise of acceleration the mean velocities over two steps differ by its density times a third
-  // of both, as variance (from the covariances in Bar-Shalom, Li, Kirubarajan 2001, 6.2.2).
-  void AddMotionsOf(std::span<const StampedPose> shot, std::span<const uint32_t> poses,
-                    const MotionNoise& noise) {
-    const std::vector<Eigen::Matrix3d> world_from_step = StepOrientations(shot);
-    for (size_t i = 2; i < shot.size(); ++i) {
-      BundleProblem::Motion motion;
-      motion.poses = {poses[i - 2], poses[i - 1], poses[i]};
-      motion.first_s = shot[i - 1].timestamp_s - shot[i - 2].timestamp_s;
-      motion.second_s = shot[i].timestamp_s - shot[i - 1].timestamp_s;
-      if (std::min(motion.first_s, motion.second_s) < kMinStep_s) continue;
-      motion.inverse_sigma = 1 / std::sqrt(noise.density * (motion.first_s + motion.second_s) / 3);
-      if (noise.is_in_camera) motion.turn = world_from_step[i] * world_from_step[i - 1].transpose();
-      problem_.motions.push_back(motion);
-    }
-  }
-
   // A part may shrink without a change of what is seen of it, and slower motion is more probable: a landmark
   // of its origin holds its scale. False if there is none.
   bool HoldScale(const Map& map, PartId part) {
@@ -202,9 +148,8 @@ class MapBundle {
   void AddToPath(PartId part, double timestamp_s, uint32_t pose) { paths_[part].emplace(timestamp_s, pose); }
 
   void Observe(const Map& map, const Landmark& landmark, uint32_t pose, const FrameView::Sighting& sighting) {
-    problem_.observations.push_back({pose, point_of_[landmark.id().value()], sighting.ideal_px.cast<double>(),
-                                     1.0 / map.octave_scales()[static_cast<size_t>(sighting.octave)],
-                                     TrustInMatch(sighting.static_probability, landmark.static_log_odds)});
+    problem_.observations.push_back(
+        ObservationOf(sighting, landmark, map.octave_scales(), pose, point_of_[landmark.id().value()]));
   }
 
   // Of the problem's first observations, those of a landmark one after the other.

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <span>
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/mapping/bundle_terms.h"
 #include "dynamic_slam/mapping/mapper_options.h"
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 
@@ -21,18 +21,10 @@ namespace dynamic_slam {
 BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, KeyframeId keyframe,
                           uint32_t epoch, const std::function<bool()>& should_stop, SharedMap* map);
 
-// How much the velocity of what carries a camera changes in a part of the map: the density of white noise of
-// its acceleration, unit of the map^2/s^3; 0 where it is not known.
-struct MotionNoise {
-  double density = 0;
-  bool is_in_camera =
-      false;  // the velocity as the camera has it, which turns with it; else as the world has it
-};
-
 // When the sequence is over: what tells where the map is beside its keyframes.
 struct PathEvidence {
-  std::span<const FrameView> views;      // frames between keyframes
-  std::map<PartId, MotionNoise>* noise;  // measured where it is not there yet: later, the path knows of it
+  std::span<const FrameView> views;  // frames between keyframes
+  MotionNoises* noise;               // measured where it is not there yet: later, the path knows of it
 };
 
 // The same of the whole map, the origin of each part fixed. With `path` its frames help to tell where the map

@@ -1,5 +1,6 @@
 #include "dynamic_slam/optimize/bundle_adjustment.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,6 +14,8 @@ namespace {
 // Above this many free poses the reduced camera system is factorised sparsely. Ceres takes more memory: with
 // 284 poses of fr1_desk 207 MB at its peak instead of 176, and as much time.
 constexpr int kMostPosesForDenseSchur = 400;
+
+constexpr int kFewestToHoldWorld = 3;  // points
 
 // The rounds of an adjustment, on a copy of the problem.
 class Adjuster {
@@ -137,9 +140,11 @@ BundleSummary AdjustBundle(const Camera& camera, const BundleOptions& options,
                            const std::function<bool()>& should_stop, BundleProblem* problem,
                            std::vector<uint8_t>* is_outlier) {
   DS_CHECK(problem != nullptr && is_outlier != nullptr);
-  bool any_fixed = false;
-  for (const BundleProblem::Pose& pose : problem->poses) any_fixed |= pose.fixed;
-  DS_CHECK(any_fixed, "poses={}: none is fixed, so the world could drift", problem->poses.size());
+  const auto is_fixed = [](const auto& part) { return part.fixed; };
+  DS_CHECK(std::ranges::any_of(problem->poses, is_fixed) ||
+               std::ranges::count_if(problem->points, is_fixed) >= kFewestToHoldWorld,
+           "poses={} points={}: too few are fixed, so the world could drift", problem->poses.size(),
+           problem->points.size());
   for (const BundleProblem::Observation& observation : problem->observations) {
     DS_CHECK(observation.pose < problem->poses.size() && observation.point < problem->points.size(),
              "pose={} of {} point={} of {}", observation.pose, problem->poses.size(), observation.point,

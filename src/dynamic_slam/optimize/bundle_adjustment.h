@@ -85,8 +85,9 @@ struct BundleSummary {
 //
 // `should_stop` may be empty; it is asked between steps, from the calling thread. `is_outlier` gets one entry
 // for each observation: its point is behind the camera or its error exceeds chi2 at the end. Fixed entries
-// are not touched. At least one pose must be fixed, or the world could drift: that, and indices out of range,
-// are checked (InternalError). An observation with a weight of 0 or a non-finite number is not used.
+// are not touched. At least one pose or three points must be fixed, or the world could drift: that, and
+// indices out of range, are checked (InternalError). An observation with a weight of 0 or a non-finite number
+// is not used.
 BundleSummary AdjustBundle(const Camera& camera, const BundleOptions& options,
                            const std::function<bool()>& should_stop, BundleProblem* problem,
                            std::vector<uint8_t>* is_outlier);

@@ -349,6 +349,12 @@ TEST(AdjustBundle, ChecksWhatTheCallerMustKnow) {
   problem.poses.push_back({Rigid3(), false});
   problem.points.push_back({});
   EXPECT_THROW(Adjust(&problem), InternalError);
+  problem.points.assign(3, {{}, true});
+  problem.points[2].fixed = false;
+  EXPECT_THROW(Adjust(&problem), InternalError) << "a pose could turn about two points";
+  problem.points[2].fixed = true;
+  EXPECT_NO_THROW(Adjust(&problem));
+  problem.points.resize(1);
   problem.poses[0].fixed = true;
   problem.observations.push_back({0, 1, {0, 0}});
   EXPECT_THROW(Adjust(&problem), InternalError);

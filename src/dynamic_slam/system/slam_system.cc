@@ -15,6 +15,7 @@
 #include "dynamic_slam/base/thread_priority.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/mapping/map_bundle.h"
+#include "dynamic_slam/mapping/path_bundle.h"
 #include "dynamic_slam/system/leap_mender.h"
 
 namespace dynamic_slam {
@@ -262,17 +263,19 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
     if (refiner_.has_value()) GrowOverParts(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
+  const bool smooths = options_.smooth_path && mode_ == RunMode::kOffline;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) tracked_.AddFound(Backfill(tracked_.Poses(), false, should_stop));
   if (refiner_.has_value() && changes_map) {
-    RefinePath(adjusts, should_stop);
+    const MotionNoises noises = RefinePath(adjusts, should_stop);
     // Without the frames between nobody knows whether the path leaps.
     if (backfiller_.has_value()) {
       LeapMender mender(camera(), options_.tracker, options_.seed, *refiner_, &tracked_, &map_);
       pieces_cut_ = mender.CutOffSides(should_stop) + mender.MendEnds(should_stop);
     }
+    if (smooths && options_.mapper.motion_prior) AdjustPathInMap(noises, should_stop);
   }
-  if (mode_ == RunMode::kOffline && options_.smooth_path) tracked_.Smooth(should_stop);
+  if (smooths) tracked_.Smooth(should_stop);
   return bundle;
 }
 
@@ -339,16 +342,24 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
   }
 }
 
-void SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& should_stop) {
-  std::map<PartId, MotionNoise> noise;
+MotionNoises SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& should_stop) {
+  MotionNoises noises;
   for (int round = 0; adjusts_map && round < kViewRounds; ++round) {
     std::vector<FrameView> views;
     tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views));
-    if (views.empty() && !options_.mapper.motion_prior) return;  // keyframes tell all
-    const PathEvidence path{views, &noise};
+    if (views.empty() && !options_.mapper.motion_prior) return noises;  // keyframes tell all
+    const PathEvidence path{views, &noises};
     if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, &path).usable) break;
   }
   tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
+  return noises;
+}
+
+void SlamSystem::AdjustPathInMap(const MotionNoises& noises, const std::function<bool()>& should_stop) {
+  std::vector<FrameView> views;
+  tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views, PoseRefiner::ViewsOf::kAll));
+  AdjustPath(camera(), options_.mapper.final_bundle, noises, should_stop, &map_, &views);
+  tracked_.Move(views);
 }
 
 void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {

@@ -17,6 +17,7 @@
 #include "dynamic_slam/loop/loop_closer.h"
 #include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/mapping/bundle_terms.h"
 #include "dynamic_slam/mapping/local_mapper.h"
 #include "dynamic_slam/system/detection_stage.h"
 #include "dynamic_slam/system/executor.h"
@@ -157,8 +158,10 @@ class SlamSystem {
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
   // Tracks frames once more in the finished map; adjusts_map: and again when that is adjusted to what they
-  // see.
-  void RefinePath(bool adjusts_map, const std::function<bool()>& should_stop);
+  // see. Returns how the camera was moved, where that is known.
+  MotionNoises RefinePath(bool adjusts_map, const std::function<bool()>& should_stop);
+  // The path becomes what is most probable in the finished map.
+  void AdjustPathInMap(const MotionNoises& noises, const std::function<bool()>& should_stop);
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops

@@ -87,6 +87,22 @@ void TrackedFrames::Replace(std::span<const AnchoredPose> poses) {
   frames_.Assign(all);
 }
 
+void TrackedFrames::Move(std::span<const FrameView> views) {
+  std::map<double, const FrameView*> by_stamp;
+  for (const FrameView& view : views) by_stamp.emplace(view.timestamp_s, &view);
+  std::vector<TrackedFrame> all = All();
+  {
+    const auto map = map_->Read();
+    for (TrackedFrame& frame : all) {
+      const auto found = by_stamp.find(frame.timestamp_s);
+      if (found == by_stamp.end() || map->PartOf(frame.reference) != found->second->part) continue;
+      const Rigid3 moved = map->CamFromReference(frame.reference, found->second->cam_from_world);
+      frame = TrackedFrame({frame.timestamp_s, frame.reference, moved}, frame.is_live);
+    }
+  }
+  frames_.Assign(all);
+}
+
 bool TrackedFrames::Leaps() const {
   const std::vector<PartId> parts = Parts();
   return std::any_of(parts.begin(), parts.end(),

@@ -41,6 +41,8 @@ class TrackedFrames {
   void AddFound(std::span<const AnchoredPose> poses);
   // Poses of frames that have one, in any order, instead.
   void Replace(std::span<const AnchoredPose> poses);
+  // Frames that hang on the part of the map in which they are views, to where these are.
+  void Move(std::span<const FrameView> views);
   void Clear() { frames_.clear(); }
 
   bool Leaps() const;

@@ -62,6 +62,20 @@ TEST_F(TrackedFramesTest, APathWithoutLeapsStaysWhole) {
   ExpectPath(PartId(0), 0, 100, 0);
 }
 
+TEST_F(TrackedFramesTest, FramesMoveToWhereTheirViewsAre) {
+  Go(30, 30, 30);
+  std::vector<FrameView> views;
+  for (const size_t i : {3u, 10u, 17u})
+    views.push_back({Stamp(i), PartId(0), SidewaysPose(Stamp(i) + 1), {}});
+  views[1].part = PartId(1);  // it has left that
+  tracked_.Move(views);
+  const Trajectory path = tracked_.PathOf(PartId(0));
+  ASSERT_EQ(path.size(), 30u);
+  for (size_t i = 0; i < path.size(); ++i) {
+    EXPECT_NEAR(path[i].world_from_cam.translation.x(), Stamp(i) + (i == 3 || i == 17 ? 1 : 0), 1e-5) << i;
+  }
+}
+
 TEST_F(TrackedFramesTest, WhatLiesBeforeALeapBecomesAPartOfItsOwn) {
   Go(100, 0, 18);
   // From frame 18 on the camera is elsewhere; 18 and 19 hang on the keyframe of before.

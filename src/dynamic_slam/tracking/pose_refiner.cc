@@ -56,11 +56,11 @@ void PoseRefiner::Keep(const Frame& frame, int min_inliers) {
 
 std::vector<AnchoredPose> PoseRefiner::Refine(std::span<const AnchoredPose> known,
                                               const std::function<bool()>& should_stop,
-                                              std::vector<FrameView>* views) {
+                                              std::vector<FrameView>* views, ViewsOf of) {
   DS_TRACE("refine");
   const KnownPoses before(known, map_);
   std::vector<Refined> refined(frames_.size());
-  if (views != nullptr) AskForViews(&refined);
+  if (views != nullptr) AskForViews(of, &refined);
   for (const bool is_forward : {true, false}) Pass(is_forward, before, should_stop, &refined);
   std::vector<AnchoredPose> found;
   for (Refined& frame : refined) {
@@ -73,7 +73,11 @@ std::vector<AnchoredPose> PoseRefiner::Refine(std::span<const AnchoredPose> know
   return found;
 }
 
-void PoseRefiner::AskForViews(std::vector<Refined>* refined) const {
+void PoseRefiner::AskForViews(ViewsOf of, std::vector<Refined>* refined) const {
+  if (of == ViewsOf::kAll) {
+    for (Refined& frame : *refined) frame.has_view = true;
+    return;
+  }
   std::set<double> keyframes;
   map_->Read()->keyframes().ForEach(
       [&](const Keyframe& keyframe) { keyframes.insert(keyframe.timestamp_s()); });

@@ -19,6 +19,11 @@ namespace dynamic_slam {
 // came, and more are known. They are kept in a file.
 class PoseRefiner {
  public:
+  enum class ViewsOf {
+    kBetweenKeyframes,  // every third frame there
+    kAll
+  };
+
   PoseRefiner(const Camera& camera, const TrackerOptions& options, SharedMap* map);
 
   // Keeps the keypoints of a frame that may be at rest. min_inliers: that a pose of it needs. Of a run with
@@ -28,10 +33,11 @@ class PoseRefiner {
   // The poses that are found for those frames that have one in `known`, each in the part of the map where
   // that is: from the frames before or else from the pose that is known, and where that leaves doubt from the
   // frames after. `should_stop` may be empty; when it says so, that is all. views: gets, if not null, what
-  // every third frame between keyframes sees of the map.
+  // those frames see of the map.
   std::vector<AnchoredPose> Refine(std::span<const AnchoredPose> known,
                                    const std::function<bool()>& should_stop,
-                                   std::vector<FrameView>* views = nullptr);
+                                   std::vector<FrameView>* views = nullptr,
+                                   ViewsOf of = ViewsOf::kBetweenKeyframes);
 
   // The backfiller keeps the frames of these stamps too, as if they had no pose.
   void GiveTo(Backfiller* backfiller, const std::set<double>& stamps) const;
@@ -58,7 +64,7 @@ class PoseRefiner {
     FrameView view;
   };
 
-  void AskForViews(std::vector<Refined>* refined) const;
+  void AskForViews(ViewsOf of, std::vector<Refined>* refined) const;
   // In the order of time or against it: tracks the frames that are in doubt from those that it came by,
   // and those that are known and not kept.
   void Pass(bool is_forward, const KnownPoses& known, const std::function<bool()>& should_stop,

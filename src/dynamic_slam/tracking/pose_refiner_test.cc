@@ -119,6 +119,17 @@ TEST_F(PoseRefinerTest, ViewsAreWhatEveryThirdFrameBetweenKeyframesSeesOfTheMap)
   }
 }
 
+TEST_F(PoseRefinerTest, WhoAsksForAllViewsGetsOneOfEachPose) {
+  for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i));
+  std::vector<FrameView> views;
+  const std::vector<AnchoredPose> refined = refiner_.Refine(known_, {}, &views, PoseRefiner::ViewsOf::kAll);
+  ASSERT_EQ(views.size(), refined.size());
+  for (size_t i = 0; i < views.size(); ++i) {
+    EXPECT_EQ(views[i].timestamp_s, refined[i].timestamp_s);
+    EXPECT_GE(views[i].sightings.size(), static_cast<size_t>(kMinInliers));
+  }
+}
+
 TEST_F(PoseRefinerTest, GivesFramesAwayAsIfTheyHadNoPose) {
   for (int i = 0; i < kFrames; ++i) Keep(i, StampOf(i));
   Backfiller backfiller(world_.camera(), TrackerOptions(), 1, &scene_.shared_map);
