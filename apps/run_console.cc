@@ -110,6 +110,13 @@ void PrintSummary(const RunSummary& summary) {
         summary.pieces_cut == 1 ? "a piece" : fmt::format("{} pieces", summary.pieces_cut),
         summary.pieces_cut == 1 ? "is" : "are");
   }
+  if (summary.frames_refuted > 0) {
+    fmt::print(
+        "{} frames have no pose any more: the finished map does not confirm theirs, and the camera cannot "
+        "have "
+        "been there\n",
+        summary.frames_refuted);
+  }
   for (const PathLeap& leap : summary.leaps) {
     fmt::print(
         "the path leaps {:.2f} s after the first frame, {:.1f} times faster than can be: unless the film has "

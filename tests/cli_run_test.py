@@ -15,7 +15,7 @@ FRAMES = 100
 RESULTS = ["config.yaml", "frames.csv", "keyframes.txt", "loops.csv", "map.ply", "report.html", "summary.json",
            "trajectory.png", "trajectory.txt"]
 SUMMARY_KEYS = ["frames_total", "frames_tracked", "frames_backfilled", "coverage", "keyframes", "landmarks", "maps", "frames_in_other_maps",
-                "initialised_at", "lost_count", "pieces_cut", "leaps", "tracking_ms", "startup_s", "wall_s", "peak_rss_mb", "mode", "seed",
+                "initialised_at", "lost_count", "pieces_cut", "frames_refuted", "leaps", "tracking_ms", "startup_s", "wall_s", "peak_rss_mb", "mode", "seed",
                 "version"]
 CAMERA = "model: pinhole\nwidth: 640\nheight: 480\nfps: 30\nfx: 535.4\nfy: 539.2\ncx: 320.1\ncy: 247.6\n"
 

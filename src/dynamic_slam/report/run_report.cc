@@ -112,6 +112,11 @@ Json TilesSection(const Run& run) {
     tiles.push_back(
         Tile("pieces cut off", fmt::format("{}", s.pieces_cut), "they stood wrong in the map", "wait"));
   }
+  if (s.frames_refuted > 0) {
+    tiles.push_back(Tile("poses given up", fmt::format("{}", s.frames_refuted),
+                         "the finished map does not confirm them, and the camera cannot have been there",
+                         "wait"));
+  }
   if (s.loops.corrected + s.loops.linked > 0) {
     tiles.push_back(Tile("loops closed", fmt::format("{}", s.loops.corrected + s.loops.linked),
                          fmt::format("{} moved the map", s.loops.corrected)));

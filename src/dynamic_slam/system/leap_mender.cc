@@ -11,7 +11,7 @@ namespace {
 
 // So long before or after a leap tracking may have gone astray: the longest first, as the path comes back
 // within a frame or two of which that would be mended alone.
-constexpr double kEnds_s[] = {2.0 / 3, 1.0 / 3, 1.0 / 6};
+constexpr double kEnds_s[] = {4.0 / 3, 2.0 / 3, 1.0 / 3, 1.0 / 6};
 
 }  // namespace
 

@@ -68,6 +68,14 @@ TEST_F(LeapMenderTest, AnEndThatWentAstrayIsFoundInTheRest) {
   EXPECT_THAT(scene_.map.Validate(), IsEmpty());
 }
 
+// As long as some people take to pass.
+TEST_F(LeapMenderTest, AStretchOfASecondIsFoundInTheRest) {
+  GoAstray(50, 70);
+  EXPECT_GT(mender_.MendEnds({}), 0);
+  for (const StampedPose& pose : tracked_.PathOf(PartId(0)))
+    EXPECT_LT(ErrorAt(pose), 0.02) << pose.timestamp_s;
+}
+
 TEST_F(LeapMenderTest, APathWithoutLeapsAndOneWhoseTrialIsInterruptedStayAsTheyAre) {
   GoAstray(kFrames, kFrames);
   EXPECT_EQ(mender_.MendEnds({}), 0);

@@ -82,6 +82,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                           {"initial_cost", summary.final_bundle.initial_cost},
                           {"final_cost", summary.final_bundle.final_cost}};
   json["pieces_cut"] = summary.pieces_cut;
+  json["frames_refuted"] = summary.frames_refuted;
   json["leaps"] = nlohmann::ordered_json::array();
   for (const PathLeap& leap : summary.leaps) {
     json["leaps"].push_back(

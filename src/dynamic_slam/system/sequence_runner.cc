@@ -158,6 +158,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
   for (size_t i = 1; i < parts.size(); ++i)
     summary.frames_in_other_maps += system.FrameTrajectory(parts[i]).size();
   summary.pieces_cut = system.PiecesCut();
+  summary.frames_refuted = system.FramesRefuted();
   summary.leaps = FindLeaps(path);
   {
     const auto map = system.map().Read();

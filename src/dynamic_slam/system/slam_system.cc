@@ -351,7 +351,13 @@ MotionNoises SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()
     const PathEvidence path{views, &noises};
     if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, &path).usable) break;
   }
-  tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop));
+  const std::vector<AnchoredPose> before = tracked_.Poses();
+  const std::vector<AnchoredPose> found = refiner_->Refine(before, should_stop);
+  tracked_.Replace(found);
+  if (should_stop && should_stop()) return noises;  // not all were looked for
+  const std::set<double> refuted = refiner_->Refuted(before, found);
+  tracked_.Remove(refuted);
+  frames_refuted_ = refuted.size();
   return noises;
 }
 
@@ -417,6 +423,7 @@ void SlamSystem::Reset() {
   colour_.release();  // a detector that hangs may still read it
   tracked_.Clear();
   pieces_cut_ = 0;
+  frames_refuted_ = 0;
   if (backfiller_.has_value()) backfiller_->Clear();
   if (refiner_.has_value()) refiner_->Clear();
   *mapping_report_.Write() = MappingReport();

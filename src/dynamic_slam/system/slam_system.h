@@ -124,6 +124,10 @@ class SlamSystem {
   // of it, or are in parts of their own.
   int PiecesCut() const { return pieces_cut_; }
 
+  // Frames whose pose the finished map did not confirm, and where the camera cannot have come by those that
+  // it did: they have none any more.
+  size_t FramesRefuted() const { return frames_refuted_; }
+
   // None without a detector.
   std::optional<DetectionReport> detection_report() const {
     return detection_.has_value() ? std::optional(detection_->report()) : std::nullopt;
@@ -158,7 +162,7 @@ class SlamSystem {
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
   // Tracks frames once more in the finished map; adjusts_map: and again when that is adjusted to what they
-  // see. Returns how the camera was moved, where that is known.
+  // see. Poses that it refutes are given up. Returns how the camera was moved, where that is known.
   MotionNoises RefinePath(bool adjusts_map, const std::function<bool()>& should_stop);
   // The path becomes what is most probable in the finished map.
   void AdjustPathInMap(const MotionNoises& noises, const std::function<bool()>& should_stop);
@@ -185,6 +189,7 @@ class SlamSystem {
   std::optional<DetectionStage> detection_;
   TrackedFrames tracked_;
   int pieces_cut_ = 0;
+  size_t frames_refuted_ = 0;
   std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
   std::optional<PoseRefiner> refiner_;    // offline, unless it is turned off
   BridgeFinder bridge_finder_;

@@ -48,6 +48,12 @@ AnchoredPose TrackedFrames::TrackedFrame::Pose() const {
   return {timestamp_s, reference, Rigid3(rotation.cast<double>(), cam_from_reference.cast<double>())};
 }
 
+void TrackedFrames::Remove(const std::set<double>& stamps) {
+  std::vector<TrackedFrame> left = All();
+  std::erase_if(left, [&](const TrackedFrame& frame) { return stamps.contains(frame.timestamp_s); });
+  frames_.Assign(left);
+}
+
 void TrackedFrames::RemoveThoseOfErasedParts() {
   const auto map = map_->Read();
   std::vector<TrackedFrame> left = All();
@@ -59,9 +65,7 @@ void TrackedFrames::RemoveAllBut(std::span<const AnchoredPose> found, const Piec
   std::set<double> stamps;
   for (const auto& [timestamp_s, centre] : piece.centres) stamps.insert(timestamp_s);
   for (const AnchoredPose& pose : found) stamps.erase(pose.timestamp_s);
-  std::vector<TrackedFrame> left = All();
-  std::erase_if(left, [&](const TrackedFrame& frame) { return stamps.contains(frame.timestamp_s); });
-  frames_.Assign(left);
+  Remove(stamps);
 }
 
 void TrackedFrames::AddFound(std::span<const AnchoredPose> poses) {

@@ -34,6 +34,7 @@ class TrackedFrames {
   // A frame later than all others. is_live: not given its pose by a later frame.
   void Add(const AnchoredPose& pose, bool is_live) { frames_.push_back(TrackedFrame(pose, is_live)); }
   void RemoveLast() { frames_.pop_back(); }
+  void Remove(const std::set<double>& stamps);
   void RemoveThoseOfErasedParts();
   // Frames of the piece that are not among these.
   void RemoveAllBut(std::span<const AnchoredPose> found, const Piece& piece);

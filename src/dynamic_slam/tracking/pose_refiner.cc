@@ -1,6 +1,8 @@
 #include "dynamic_slam/tracking/pose_refiner.h"
 
 #include <algorithm>
+#include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -147,6 +149,34 @@ Frame PoseRefiner::Restore(const KeptFrame& kept) const {
   }
   keypoints_.Release(kept.first, kept.count);
   return finder_.MakeFrame(kept.id, kept.timestamp_s, std::move(features), std::move(static_probability));
+}
+
+std::set<double> PoseRefiner::Refuted(std::span<const AnchoredPose> known,
+                                      std::span<const AnchoredPose> found) const {
+  std::set<double> kept;
+  for (const KeptFrame& frame : frames_) kept.insert(frame.timestamp_s);
+  const KnownPoses confirmed(found, map_);
+  std::map<PartId, KnownPoses> of_parts;
+  struct Row {  // of frames that nothing confirms, where they are: between the same that are
+    std::vector<double> stamps;
+    size_t out_of_reach = 0;
+  };
+  std::map<std::pair<PartId, double>, Row> rows;
+  for (const AnchoredPose& pose : known) {
+    if (!kept.contains(pose.timestamp_s) || confirmed.Contains(pose.timestamp_s)) continue;
+    constexpr double kAnyTime = std::numeric_limits<double>::infinity();
+    const PartId part = map_->Read()->PartOf(pose.reference);
+    if (!of_parts.contains(part)) of_parts.emplace(part, confirmed.Within(part, -kAnyTime, kAnyTime));
+    const KnownPoses& of_part = of_parts.at(part);
+    Row& row = rows[{part, of_part.Between(pose.timestamp_s).first}];
+    row.stamps.push_back(pose.timestamp_s);
+    row.out_of_reach += !of_part.IsPlausible(pose);
+  }
+  std::set<double> refuted;
+  for (const auto& [where, row] : rows) {
+    if (2 * row.out_of_reach > row.stamps.size()) refuted.insert(row.stamps.begin(), row.stamps.end());
+  }
+  return refuted;
 }
 
 void PoseRefiner::GiveTo(Backfiller* backfiller, const std::set<double>& stamps) const {

@@ -39,6 +39,10 @@ class PoseRefiner {
                                    std::vector<FrameView>* views = nullptr,
                                    ViewsOf of = ViewsOf::kBetweenKeyframes);
 
+  // Of frames that have a pose in `known`, and none in `found`, what Refine returned: the stamps of those in
+  // a row to most of which the camera cannot have come from the ones that were found.
+  std::set<double> Refuted(std::span<const AnchoredPose> known, std::span<const AnchoredPose> found) const;
+
   // The backfiller keeps the frames of these stamps too, as if they had no pose.
   void GiveTo(Backfiller* backfiller, const std::set<double>& stamps) const;
 

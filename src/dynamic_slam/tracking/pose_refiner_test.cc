@@ -1,6 +1,7 @@
 #include "dynamic_slam/tracking/pose_refiner.h"
 
 #include <cmath>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -78,6 +79,20 @@ TEST_F(PoseRefinerTest, AFrameWithoutAPoseOrWithTooFewInliersGetsNone) {
     EXPECT_NE(pose.timestamp_s, StampOf(10));
     EXPECT_NE(pose.timestamp_s, StampOf(20));
   }
+}
+
+TEST_F(PoseRefinerTest, WhatTheMapDoesNotConfirmIsRefutedWhereTheCameraCannotHaveBeen) {
+  const std::set<int> unconfirmed{4, 9, 10, 11, 15, 16, 17}, away{9, 10, 15};
+  for (int i = 0; i < kFrames; ++i) {
+    const double known_x = StampOf(i) + (away.contains(i) ? 3 : 0);
+    Keep(i, known_x, unconfirmed.contains(i) ? 10000 : kMinInliers);
+  }
+  known_.push_back({StampOf(4 * kFrames), keyframes_[0], SidewaysPose(99)});  // was not kept
+  const std::vector<AnchoredPose> found = refiner_.Refine(known_, {});
+  EXPECT_THAT(found, SizeIs(kFrames - 7));
+  EXPECT_THAT(refiner_.Refuted(known_, found), ElementsAre(StampOf(9), StampOf(10), StampOf(11)))
+      << "most of the row is where the camera cannot be";
+  EXPECT_THAT(refiner_.Refuted(known_, {}), IsEmpty()) << "nobody knows";
 }
 
 TEST_F(PoseRefinerTest, KeypointsOfMoversAreNotLookedAt) {
