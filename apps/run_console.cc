@@ -112,8 +112,7 @@ void PrintSummary(const RunSummary& summary) {
   }
   if (summary.frames_refuted > 0) {
     fmt::print(
-        "{} frames have no pose any more: the finished map does not confirm theirs, and the camera cannot "
-        "have "
+        "{} frames have lost their pose: the finished map does not confirm it, and the camera cannot have "
         "been there\n",
         summary.frames_refuted);
   }

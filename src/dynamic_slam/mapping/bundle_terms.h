@@ -20,11 +20,11 @@ BundleProblem::Observation ObservationOf(const FrameView::Sighting& sighting, co
                                          std::span<const float> octave_scales, uint32_t pose, uint32_t point);
 
 // How much the velocity of what carries a camera changes in a part of the map: the density of white noise of
-// its acceleration, unit of the map^2/s^3; 0 where it is not known.
+// its acceleration, unit of the map^2/s^3; 0 where it is not known. is_in_camera: of the velocity as the
+// camera has it, which turns with it, else as the world has it.
 struct MotionNoise {
   double density = 0;
-  bool is_in_camera =
-      false;  // the velocity as the camera has it, which turns with it; else as the world has it
+  bool is_in_camera = false;
 };
 
 using MotionNoises = std::map<PartId, MotionNoise>;

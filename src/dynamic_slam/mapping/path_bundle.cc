@@ -2,11 +2,16 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <span>
 #include <unordered_map>
 
+#include <Eigen/Cholesky>
+
+#include "dynamic_slam/base/percentile.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/optimize/path_smoother.h"
+#include "dynamic_slam/optimize/reprojection_cost.h"
 
 namespace dynamic_slam {
 namespace {
@@ -15,9 +20,8 @@ namespace {
 // nothing of those that are a second away, where all see the map.
 constexpr size_t kWindow = 150, kLookAhead = 50;
 
-// Frames see the same landmarks, and err together. Poses that were found each for itself scatter by so many
-// times what their keypoints alone would make them: fr1_desk 2.1, with people 2.3 and 2.4, redkitchen 1.7.
-constexpr double kScatter = 2;
+// Of what a view says of its pose: below it, that is nothing in some direction.
+constexpr double kLeastCondition = 1e-12;
 
 class PathBundle {
  public:
@@ -25,9 +29,9 @@ class PathBundle {
              SharedMap* map)
       : camera_(camera), options_(options), should_stop_(should_stop), map_(map) {}
 
-  // shot: of the path, without cuts; noise: of its motion.
-  void Adjust(std::span<FrameView* const> shot, MotionNoise noise) const {
-    noise.density /= kScatter * kScatter;
+  // shot: of the path, without cuts, and where its poses are; noise: of its motion.
+  void Adjust(std::span<FrameView* const> shot, std::span<const StampedPose> poses, MotionNoise noise) const {
+    noise.density /= Scatter(shot, poses);
     for (size_t begin = 0; begin < shot.size(); begin += kWindow) {
       if (should_stop_ && should_stop_()) return;
       // Those before are done.
@@ -45,6 +49,44 @@ class PathBundle {
   }
 
  private:
+  // How much the poses that were found each for itself scatter, over what their keypoints alone would make
+  // them, as variances. Neighbours see the same landmarks, with the same errors: fr1_desk has 4, with people
+  // 5 to 6, redkitchen 3. Less than 1 does not show beside the motion.
+  double Scatter(std::span<FrameView* const> shot, std::span<const StampedPose> poses) const {
+    const auto map = map_->Read();
+    std::vector<double> expected;
+    for (const FrameView* view : shot) {
+      if (const std::optional<double> variance = VarianceOf(*view, *map)) expected.push_back(*variance);
+    }
+    if (expected.empty()) return 1;
+    return std::max(1.0, PositionVariance(poses) / Percentile(0.5, &expected));
+  }
+
+  // Of the camera's position in each coordinate, by what the view sees of landmarks that are exact.
+  std::optional<double> VarianceOf(const FrameView& view, const Map& map) const {
+    Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+    for (const FrameView::Sighting& sighting : view.sightings) {
+      const Landmark* landmark = map.landmarks().Find(sighting.landmark);
+      if (landmark == nullptr) continue;
+      const BundleProblem::Observation seen = ObservationOf(sighting, *landmark, map.octave_scales(), 0, 0);
+      const Eigen::Vector3d x = view.cam_from_world * landmark->position();
+      if (!(x.z() > kMinProjectionDepth)) continue;
+      const Eigen::Vector2d error = seen.inverse_sigma_px * (camera_.Project(x) - seen.ideal_px);
+      if (error.squaredNorm() > options_.chi2) continue;
+      Eigen::Matrix<double, 2, 3> J_cam;  // of x
+      J_cam << camera_.fx, 0, -camera_.fx * x.x() / x.z(), 0, camera_.fy, -camera_.fy * x.y() / x.z();
+      J_cam *= seen.inverse_sigma_px / x.z();
+      Eigen::Matrix<double, 2, 6> J;  // of x -> Exp(rotation) x + translation
+      J << -J_cam * Skew(x), J_cam;
+      information += seen.weight * J.transpose() * J;
+    }
+    const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factor(information);
+    if (!factor.isPositive() || factor.rcond() < kLeastCondition) return std::nullopt;
+    // The centre moves as far as the translation, wherever the camera looks.
+    const Eigen::Matrix<double, 6, 6> covariance = factor.solve(Eigen::Matrix<double, 6, 6>::Identity());
+    return covariance.bottomRightCorner<3, 3>().trace() / 3;
+  }
+
   BundleProblem ProblemOf(std::span<FrameView* const> window, size_t fixed, const MotionNoise& noise) const {
     BundleProblem problem;
     Trajectory path;
@@ -96,7 +138,7 @@ void AdjustPath(const Camera& camera, const BundleOptions& options, const Motion
     if (!(noise.density > 0)) continue;
     size_t first = 0;
     for (const std::span<const StampedPose> shot : shots) {
-      bundle.Adjust(std::span(path).subspan(first, shot.size()), noise);
+      bundle.Adjust(std::span(path).subspan(first, shot.size()), shot, noise);
       first += shot.size();
     }
   }

@@ -118,7 +118,7 @@ TEST_F(PathBundleTest, WhereAPieceEndsMakesNoDifference) {
   Adjust(&whole, steady_);
   Adjust(&later, steady_);
   for (size_t i = 60; i < later.size(); ++i) {
-    EXPECT_LT((CentreOf(later[i]) - CentreOf(whole[i + 70])).norm(), 0.01 * Rmse(whole)) << i;
+    EXPECT_LT((CentreOf(later[i]) - CentreOf(whole[i + 70])).norm(), 0.05 * Rmse(whole)) << i;
   }
 }
 

@@ -63,6 +63,7 @@ class PointSmoother {
 
   // After Smooth().
   double MotionNoise() const { return ratio_ * variance_; }
+  double PointVariance() const { return variance_; }
 
  private:
   using State = Eigen::Matrix<double, 2, D>;  // the point, and its speed
@@ -192,6 +193,12 @@ std::vector<Eigen::Vector3d> PositionsOf(std::span<const StampedPose> poses) {
   return positions;
 }
 
+PointSmoother<3> SmoothedPositions(std::span<const StampedPose> poses) {
+  PointSmoother<3> smoother(StampsOf(poses), PositionsOf(poses));
+  smoother.Smooth();
+  return smoother;
+}
+
 // Without cuts.
 void SmoothShot(std::span<const StampedPose> poses, std::vector<Rigid3>* smooth) {
   const size_t first = smooth->size();
@@ -223,10 +230,11 @@ std::vector<std::span<const StampedPose>> ShotsOf(std::span<const StampedPose> p
 }
 
 double AccelerationNoise(std::span<const StampedPose> poses) {
-  if (poses.size() < kFewestForNoise) return 0;
-  PointSmoother<3> smoother(StampsOf(poses), PositionsOf(poses));
-  smoother.Smooth();
-  return smoother.MotionNoise();
+  return poses.size() < kFewestForNoise ? 0 : SmoothedPositions(poses).MotionNoise();
+}
+
+double PositionVariance(std::span<const StampedPose> poses) {
+  return poses.size() < kFewestForNoise ? 0 : SmoothedPositions(poses).PointVariance();
 }
 
 std::vector<Rigid3> SmoothPath(std::span<const StampedPose> poses) {

@@ -24,4 +24,8 @@ std::vector<std::span<const StampedPose>> ShotsOf(std::span<const StampedPose> p
 // time t a velocity changes by its root times that of t.
 double AccelerationNoise(std::span<const StampedPose> poses);
 
+// The variance of the noise of the positions, m^2 in each coordinate; 0 where it is not known, or too small
+// to show beside the motion.
+double PositionVariance(std::span<const StampedPose> poses);
+
 }  // namespace dynamic_slam

@@ -160,12 +160,14 @@ TEST(AccelerationNoiseTest, IsThatOfTheSimulatedPath) {
     }
     EXPECT_GT(AccelerationNoise(path), 0.5 * kNoise);
     EXPECT_LT(AccelerationNoise(path), 2 * kNoise);
+    EXPECT_NEAR(std::sqrt(PositionVariance(path)), 0.001, 0.0003);
   }
 }
 
 TEST(AccelerationNoiseTest, IsNotKnownOfFewPosesOrOfACameraThatStands) {
   const std::vector<StampedPose> path = Path(HandAt, 0.001);
   EXPECT_EQ(AccelerationNoise(std::span(path).first(19)), 0);
+  EXPECT_EQ(PositionVariance(std::span(path).first(19)), 0);
   EXPECT_EQ(AccelerationNoise(Path([](double) { return Rigid3(); }, 0)), 0);
 }
 

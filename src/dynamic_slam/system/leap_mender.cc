@@ -16,7 +16,13 @@ constexpr double kEnds_s[] = {4.0 / 3, 2.0 / 3, 1.0 / 3, 1.0 / 6};
 }  // namespace
 
 int LeapMender::CutOffSides(const std::function<bool()>& should_stop) {
-  return Mend(tracked_->PiecesAtLeaps(), should_stop);
+  std::vector<TrackedFrames::Piece> pieces = tracked_->PiecesAtLeaps();
+  const size_t guessed = std::erase_if(pieces, [this](const TrackedFrames::Piece& piece) {
+    if (!tracked_->IsGuessed(piece)) return false;
+    tracked_->RemoveAllBut({}, piece);
+    return true;
+  });
+  return static_cast<int>(guessed) + Mend(pieces, should_stop);
 }
 
 int LeapMender::MendEnds(const std::function<bool()>& should_stop) {

@@ -68,6 +68,18 @@ TEST_F(LeapMenderTest, AnEndThatWentAstrayIsFoundInTheRest) {
   EXPECT_THAT(scene_.map.Validate(), IsEmpty());
 }
 
+TEST_F(LeapMenderTest, WhatWasOnlyGuessedBeyondALeapHasNoPoseAnyMore) {
+  GoAstray(kFrames, kFrames);
+  std::vector<AnchoredPose> guessed;
+  for (int i = kFrames + 20; i < kFrames + 26; ++i)
+    guessed.push_back({StampOf(i), keyframes_[0], SidewaysPose(9)});
+  tracked_.AddFound(guessed);
+  ASSERT_TRUE(tracked_.Leaps());
+  EXPECT_EQ(mender_.CutOffSides({}), 1);
+  EXPECT_FALSE(tracked_.Leaps());
+  EXPECT_THAT(tracked_.PathOf(PartId(0)), SizeIs(kFrames));
+}
+
 // As long as some people take to pass.
 TEST_F(LeapMenderTest, AStretchOfASecondIsFoundInTheRest) {
   GoAstray(50, 70);

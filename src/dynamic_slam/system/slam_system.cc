@@ -263,19 +263,20 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
     if (refiner_.has_value()) GrowOverParts(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
-  const bool smooths = options_.smooth_path && mode_ == RunMode::kOffline;
   const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
   if (backfiller_.has_value()) tracked_.AddFound(Backfill(tracked_.Poses(), false, should_stop));
   if (refiner_.has_value() && changes_map) {
-    const MotionNoises noises = RefinePath(adjusts, should_stop);
+    MotionNoises noises;
+    if (adjusts) RefineMap(should_stop, &noises);
+    RefinePath(noises, should_stop);
     // Without the frames between nobody knows whether the path leaps.
     if (backfiller_.has_value()) {
       LeapMender mender(camera(), options_.tracker, options_.seed, *refiner_, &tracked_, &map_);
       pieces_cut_ = mender.CutOffSides(should_stop) + mender.MendEnds(should_stop);
+      if (pieces_cut_ > 0) RefinePath(noises, should_stop);
     }
-    if (smooths && options_.mapper.motion_prior) AdjustPathInMap(noises, should_stop);
   }
-  if (smooths) tracked_.Smooth(should_stop);
+  if (Smooths()) tracked_.Smooth(should_stop);
   return bundle;
 }
 
@@ -342,28 +343,27 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
   }
 }
 
-MotionNoises SlamSystem::RefinePath(bool adjusts_map, const std::function<bool()>& should_stop) {
-  MotionNoises noises;
-  for (int round = 0; adjusts_map && round < kViewRounds; ++round) {
+void SlamSystem::RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises) {
+  for (int round = 0; round < kViewRounds; ++round) {
     std::vector<FrameView> views;
     tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views));
-    if (views.empty() && !options_.mapper.motion_prior) return noises;  // keyframes tell all
-    const PathEvidence path{views, &noises};
-    if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, &path).usable) break;
+    if (views.empty() && !options_.mapper.motion_prior) return;  // keyframes tell all
+    const PathEvidence path{views, noises};
+    if (!AdjustAll(camera(), options_.mapper, should_stop, &map_, &path).usable) return;
   }
-  const std::vector<AnchoredPose> before = tracked_.Poses();
-  const std::vector<AnchoredPose> found = refiner_->Refine(before, should_stop);
-  tracked_.Replace(found);
-  if (should_stop && should_stop()) return noises;  // not all were looked for
-  const std::set<double> refuted = refiner_->Refuted(before, found);
-  tracked_.Remove(refuted);
-  frames_refuted_ = refuted.size();
-  return noises;
 }
 
-void SlamSystem::AdjustPathInMap(const MotionNoises& noises, const std::function<bool()>& should_stop) {
+void SlamSystem::RefinePath(const MotionNoises& noises, const std::function<bool()>& should_stop) {
+  const std::vector<AnchoredPose> before = tracked_.Poses();
   std::vector<FrameView> views;
-  tracked_.Replace(refiner_->Refine(tracked_.Poses(), should_stop, &views, PoseRefiner::ViewsOf::kAll));
+  const std::vector<AnchoredPose> found =
+      refiner_->Refine(before, should_stop, &views, PoseRefiner::ViewsOf::kAll);
+  tracked_.Replace(found);
+  if (should_stop && should_stop()) return;  // not all were looked for
+  const std::set<double> refuted = refiner_->Refuted(before, found);
+  tracked_.Remove(refuted);
+  frames_refuted_ += refuted.size();
+  if (!Smooths() || !options_.mapper.motion_prior) return;
   AdjustPath(camera(), options_.mapper.final_bundle, noises, should_stop, &map_, &views);
   tracked_.Move(views);
 }

@@ -161,11 +161,13 @@ class SlamSystem {
   void CloseBorders(const std::function<bool()>& should_stop);
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
-  // Tracks frames once more in the finished map; adjusts_map: and again when that is adjusted to what they
-  // see. Poses that it refutes are given up. Returns how the camera was moved, where that is known.
-  MotionNoises RefinePath(bool adjusts_map, const std::function<bool()>& should_stop);
-  // The path becomes what is most probable in the finished map.
-  void AdjustPathInMap(const MotionNoises& noises, const std::function<bool()>& should_stop);
+  // Adjusts the map to what frames see that are tracked once more in it. noises: gets how the camera was
+  // moved, where that is known.
+  void RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises);
+  // Tracks frames once more in the finished map. Poses that it refutes are given up; the path of the others
+  // becomes what is most probable.
+  void RefinePath(const MotionNoises& noises, const std::function<bool()>& should_stop);
+  bool Smooths() const { return options_.smooth_path && mode_ == RunMode::kOffline; }
   void PostMapping(KeyframeId keyframe, uint32_t epoch);
   void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
   void DrainMapping();  // and the search for loops

@@ -197,6 +197,18 @@ PartId TrackedFrames::CutOff(const Piece& piece) {
   return own;
 }
 
+bool TrackedFrames::IsGuessed(const Piece& piece) const {
+  for (const TrackedFrame& frame : frames_) {
+    if (frame.is_live && piece.centres.contains(frame.timestamp_s)) return false;
+  }
+  bool has_keyframe = false;
+  map_->Read()->keyframes().ForEach([&](const Keyframe& keyframe) {
+    has_keyframe |= keyframe.part() == piece.part && keyframe.frame_id().IsValid() &&
+                    piece.centres.contains(keyframe.timestamp_s());
+  });
+  return !has_keyframe;
+}
+
 bool TrackedFrames::IsWrong(const Piece& piece, std::span<const AnchoredPose> found) const {
   Trajectory now;
   {

@@ -60,6 +60,9 @@ class TrackedFrames {
   // on these; all others hang on the rest. Returns those parts.
   std::vector<PartId> CutOff(std::span<const Piece> pieces);
 
+  // Whether none of the piece's frames had a pose when its turn came, and none became a keyframe.
+  bool IsGuessed(const Piece& piece) const;
+
   // Whether the piece, cut off, stood wrong in its part, by the poses that were found in the rest. A whole
   // side of a leap: of a quarter of its frames or more, and most of these are farther away than the camera
   // moves from one frame to the next. An end: of nearly all, and with them the path leaps there no more.
