@@ -22,8 +22,8 @@ class LeapMender {
       : camera_(camera), options_(options), seed_(seed), kept_(kept), tracked_(tracked), map_(map) {}
 
   // What lies on one side of all leaps, and whose frames the rest of the map has elsewhere, becomes a part of
-  // its own; those frames get their pose in the rest. Frames there that were found later only, by what they look
-  // like, have none any more. `should_stop` may be empty. Returns how many pieces.
+  // its own; those frames get their pose in the rest. Frames there that were found later only, by what they
+  // look like, have none any more. `should_stop` may be empty. Returns how many pieces.
   int CutOffSides(const std::function<bool()>& should_stop);
 
   // Tracking goes astray before it is lost, and may have begun so: ends with which the path leaps, and with
