@@ -20,6 +20,9 @@ namespace {
 // nothing of those that are a second away, where all see the map.
 constexpr size_t kWindow = 150, kLookAhead = 50;
 
+// So few do not tell where a path is (AdjustBundle).
+constexpr size_t kFewestPoints = 3;
+
 // Of what a view says of its pose: below it, that is nothing in some direction.
 constexpr double kLeastCondition = 1e-12;
 
@@ -39,7 +42,8 @@ class PathBundle {
       const size_t end = std::min(begin + kWindow + kLookAhead, shot.size());
       const auto window = shot.subspan(begin - fixed, end - begin + fixed);
       BundleProblem problem = ProblemOf(window, fixed, noise);
-      if (problem.motions.empty() || problem.observations.empty()) continue;
+      const bool is_held = fixed > 0 || problem.points.size() >= kFewestPoints;
+      if (problem.motions.empty() || !is_held) continue;
       std::vector<uint8_t> is_outlier;
       if (!AdjustBundle(camera_, options_, should_stop_, &problem, &is_outlier).usable) continue;
       for (size_t i = fixed; i < std::min(fixed + kWindow, window.size()); ++i) {

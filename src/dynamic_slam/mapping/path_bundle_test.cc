@@ -136,6 +136,17 @@ TEST_F(PathBundleTest, PartsOfTheMapHaveAPathEach) {
   for (size_t i = 0; i < one.size(); ++i) EXPECT_EQ(CentreOf(both[2 * i]), CentreOf(one[i])) << i;
 }
 
+TEST_F(PathBundleTest, WhatSeesNextToNothingStays) {
+  std::vector<FrameView> views = See(30);
+  for (FrameView& view : views) {
+    std::erase_if(view.sightings,
+                  [&](const FrameView::Sighting& sighting) { return sighting.landmark.value() > 1; });
+  }
+  const std::vector<FrameView> before = views;
+  Adjust(&views, steady_);
+  for (size_t i = 0; i < views.size(); ++i) EXPECT_EQ(CentreOf(views[i]), CentreOf(before[i]));
+}
+
 TEST_F(PathBundleTest, StopsWhenItIsTold) {
   std::vector<FrameView> views = See(120);
   const std::vector<FrameView> before = views;
