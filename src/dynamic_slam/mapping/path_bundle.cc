@@ -20,9 +20,6 @@ namespace {
 // nothing of those that are a second away, where all see the map.
 constexpr size_t kWindow = 150, kLookAhead = 50;
 
-// So few do not tell where a path is (AdjustBundle).
-constexpr size_t kFewestPoints = 3;
-
 // Of what a view says of its pose: below it, that is nothing in some direction.
 constexpr double kLeastCondition = 1e-12;
 
@@ -42,7 +39,7 @@ class PathBundle {
       const size_t end = std::min(begin + kWindow + kLookAhead, shot.size());
       const auto window = shot.subspan(begin - fixed, end - begin + fixed);
       BundleProblem problem = ProblemOf(window, fixed, noise);
-      const bool is_held = fixed > 0 || problem.points.size() >= kFewestPoints;
+      const bool is_held = fixed > 0 || problem.points.size() >= kFewestPointsToHoldWorld;
       if (problem.motions.empty() || !is_held) continue;
       std::vector<uint8_t> is_outlier;
       if (!AdjustBundle(camera_, options_, should_stop_, &problem, &is_outlier).usable) continue;

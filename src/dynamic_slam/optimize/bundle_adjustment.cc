@@ -15,8 +15,6 @@ namespace {
 // 284 poses of fr1_desk 207 MB at its peak instead of 176, and as much time.
 constexpr int kMostPosesForDenseSchur = 400;
 
-constexpr int kFewestToHoldWorld = 3;  // points
-
 // The rounds of an adjustment, on a copy of the problem.
 class Adjuster {
  public:
@@ -141,10 +139,11 @@ BundleSummary AdjustBundle(const Camera& camera, const BundleOptions& options,
                            std::vector<uint8_t>* is_outlier) {
   DS_CHECK(problem != nullptr && is_outlier != nullptr);
   const auto is_fixed = [](const auto& part) { return part.fixed; };
-  DS_CHECK(std::ranges::any_of(problem->poses, is_fixed) ||
-               std::ranges::count_if(problem->points, is_fixed) >= kFewestToHoldWorld,
-           "poses={} points={}: too few are fixed, so the world could drift", problem->poses.size(),
-           problem->points.size());
+  DS_CHECK(
+      std::ranges::any_of(problem->poses, is_fixed) ||
+          static_cast<size_t>(std::ranges::count_if(problem->points, is_fixed)) >= kFewestPointsToHoldWorld,
+      "poses={} points={}: too few are fixed, so the world could drift", problem->poses.size(),
+      problem->points.size());
   for (const BundleProblem::Observation& observation : problem->observations) {
     DS_CHECK(observation.pose < problem->poses.size() && observation.point < problem->points.size(),
              "pose={} of {} point={} of {}", observation.pose, problem->poses.size(), observation.point,

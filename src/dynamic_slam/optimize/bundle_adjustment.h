@@ -81,13 +81,15 @@ struct BundleSummary {
   int outliers = 0;
 };
 
+// With fewer fixed points, and no fixed pose, the world could drift.
+inline constexpr size_t kFewestPointsToHoldWorld = 3;
+
 // Minimises the reprojection error over all free poses and points and writes them back into `problem`.
 //
 // `should_stop` may be empty; it is asked between steps, from the calling thread. `is_outlier` gets one entry
 // for each observation: its point is behind the camera or its error exceeds chi2 at the end. Fixed entries
-// are not touched. At least one pose or three points must be fixed, or the world could drift: that, and
-// indices out of range, are checked (InternalError). An observation with a weight of 0 or a non-finite number
-// is not used.
+// are not touched. At least one pose or kFewestPointsToHoldWorld must be fixed: that, and indices out of
+// range, are checked (InternalError). An observation with a weight of 0 or a non-finite number is not used.
 BundleSummary AdjustBundle(const Camera& camera, const BundleOptions& options,
                            const std::function<bool()>& should_stop, BundleProblem* problem,
                            std::vector<uint8_t>* is_outlier);

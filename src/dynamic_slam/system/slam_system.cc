@@ -355,15 +355,16 @@ void SlamSystem::RefineMap(const std::function<bool()>& should_stop, MotionNoise
 
 void SlamSystem::RefinePath(const MotionNoises& noises, const std::function<bool()>& should_stop) {
   const std::vector<AnchoredPose> before = tracked_.Poses();
+  const bool adjusts = Smooths() && options_.mapper.motion_prior;
   std::vector<FrameView> views;
   const std::vector<AnchoredPose> found =
-      refiner_->Refine(before, should_stop, &views, PoseRefiner::ViewsOf::kAll);
+      refiner_->Refine(before, should_stop, adjusts ? &views : nullptr, PoseRefiner::ViewsOf::kAll);
   tracked_.Replace(found);
   if (should_stop && should_stop()) return;  // not all were looked for
   const std::set<double> refuted = refiner_->Refuted(before, found);
   tracked_.Remove(refuted);
   frames_refuted_ += refuted.size();
-  if (!Smooths() || !options_.mapper.motion_prior) return;
+  if (!adjusts) return;
   AdjustPath(camera(), options_.mapper.final_bundle, noises, should_stop, &map_, &views);
   tracked_.Move(views);
 }
