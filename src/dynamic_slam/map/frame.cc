@@ -4,6 +4,18 @@
 
 namespace dynamic_slam {
 
+Frame FrameOf(const Keyframe& keyframe) {
+  Frame frame;
+  frame.id = keyframe.frame_id();
+  frame.timestamp_s = keyframe.timestamp_s();
+  frame.features = keyframe.features();
+  frame.grid = keyframe.grid();
+  frame.static_probability = keyframe.static_probability();
+  frame.cam_from_world = keyframe.cam_from_world();
+  frame.ClearLandmarks();
+  return frame;
+}
+
 KeyframeId InsertKeyframe(const Frame& frame, Map* map, PartId part) {
   const KeyframeId id = map->AddKeyframe(frame.id, frame.timestamp_s, frame.cam_from_world, frame.features,
                                          frame.grid, frame.static_probability, part)

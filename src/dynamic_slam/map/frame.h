@@ -78,7 +78,11 @@ struct FrameView {
   std::vector<Sighting> sightings;
 };
 
+class Keyframe;
 class Map;
+
+// The keyframe's image again, to be looked for in the map: without landmarks.
+Frame FrameOf(const Keyframe& keyframe);
 
 // Makes the frame a keyframe that sees the frame's landmarks, in a part of the map. These are not refreshed
 // (Map::RefreshLandmark): local mapping does it, so that tracking need not.

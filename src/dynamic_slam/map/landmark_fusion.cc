@@ -19,6 +19,17 @@ void MergeTwo(LandmarkId present, LandmarkId candidate, Map* map) {
 
 }  // namespace
 
+bool LinkOrMerge(KeyframeId keyframe, uint32_t keypoint, LandmarkId landmark, Map* map) {
+  const LandmarkId present = map->keyframes().At(keyframe).landmarks()[keypoint];
+  if (present.IsValid()) {
+    MergeTwo(present, landmark, map);
+    return true;
+  }
+  map->Link(keyframe, keypoint, landmark);
+  map->RefreshLandmark(landmark);
+  return false;
+}
+
 FusionCount LandmarkFusion::FuseInto(KeyframeId target_id, const std::vector<LandmarkId>& landmarks,
                                      Map* map) {
   FusionCount count;
@@ -29,14 +40,7 @@ FusionCount LandmarkFusion::FuseInto(KeyframeId target_id, const std::vector<Lan
     if (landmark == nullptr) continue;
     const std::optional<uint32_t> keypoint = Find(*landmark, target, *map);
     if (!keypoint.has_value()) continue;
-    if (const LandmarkId present = target.landmarks()[*keypoint]; present.IsValid()) {
-      MergeTwo(present, candidate, map);
-      ++count.merged;
-    } else {
-      map->Link(target_id, *keypoint, candidate);
-      map->RefreshLandmark(candidate);
-      ++count.linked;
-    }
+    ++(LinkOrMerge(target_id, *keypoint, candidate, map) ? count.merged : count.linked);
   }
   return count;
 }

@@ -14,6 +14,11 @@ struct FusionCount {
   int merged = 0;  // pairs of landmarks that were one
 };
 
+// The keypoint shows the landmark: it is linked, or merged with the one that the keypoint has; of two the one
+// with more evidence stays. Returns whether there were two. The keyframe must not see it with another
+// keypoint.
+bool LinkOrMerge(KeyframeId keyframe, uint32_t keypoint, LandmarkId landmark, Map* map);
+
 // Projects landmarks into a keyframe. Passes over those that are gone.
 class LandmarkFusion {
  public:

@@ -12,8 +12,8 @@ constexpr size_t kNeighbours = 10;
 // Landmarks lie anywhere in memory, so each is asked for some steps before it is read.
 constexpr size_t kAhead = 12;
 
-// Copies kept beside those in view, about as many as are in view: in a map that is only read they would become
-// all of it.
+// Copies kept beside those in view, about as many as are in view: in a map that is only read they would
+// become all of it.
 constexpr size_t kMostCopiesBeside = 4000;
 
 void FetchAhead(const Landmark* landmark) {
@@ -35,6 +35,15 @@ void LocalViewBuilder::Build(const Map& map, uint64_t writes, const std::vector<
   CountVotes(map, seen);
   ChooseKeyframes(map, static_cast<size_t>(max_keyframes), view);
   CollectLandmarks(map);
+  CopyLandmarks(map, view);
+}
+
+void LocalViewBuilder::Copy(const Map& map, const std::vector<LandmarkId>& landmarks, LocalView* view) {
+  ForgetCopies(view);
+  writes_.reset();
+  view->reference = KeyframeId();
+  view->revision = map.revision();
+  landmarks_ = landmarks;
   CopyLandmarks(map, view);
 }
 
@@ -126,6 +135,7 @@ void LocalViewBuilder::CopyLandmarks(const Map& map, LocalView* view) {
 }
 
 void LocalViewBuilder::ForgetCopies(LocalView* view) {
+  slots_.resize(kSlots);
   for (const LandmarkId id : view->ids) slots_[id.value() % kSlots] = {};
   view->ids.clear();
   view->positions.clear();

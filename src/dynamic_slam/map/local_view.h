@@ -42,6 +42,9 @@ class LocalViewBuilder {
   void Build(const Map& map, uint64_t writes, const std::vector<LandmarkId>& seen, int max_keyframes,
              LocalView* view);
 
+  // The landmarks given, and no keyframe.
+  void Copy(const Map& map, const std::vector<LandmarkId>& landmarks, LocalView* view);
+
  private:
   void CountVotes(const Map& map, const std::vector<LandmarkId>& seen);
   void ChooseKeyframes(const Map& map, size_t limit, LocalView* view);

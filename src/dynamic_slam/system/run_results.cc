@@ -61,6 +61,7 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
       {"refused", std::count_if(summary.loops.attempts.begin(), summary.loops.attempts.end(),
                                 [](const LoopAttempt& attempt) { return !attempt.reason.empty(); })},
       {"landmarks_merged", summary.loops.landmarks_merged},
+      {"revisit_links", summary.loops.revisit_links},
       {"bundles", summary.loops.bundles},
       {"bundles_stopped", summary.loops.bundles_stopped}};
   if (summary.detection.has_value()) {

@@ -17,6 +17,7 @@
 #include "dynamic_slam/mapping/map_bundle.h"
 #include "dynamic_slam/mapping/path_bundle.h"
 #include "dynamic_slam/system/leap_mender.h"
+#include "dynamic_slam/tracking/revisit_finder.h"
 
 namespace dynamic_slam {
 namespace {
@@ -263,7 +264,11 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
     if (refiner_.has_value()) GrowOverParts(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
-  const BundleSummary bundle = adjusts ? mapper_.Finish(should_stop) : BundleSummary();
+  BundleSummary bundle;
+  if (adjusts) {
+    bundle = mapper_.Finish(should_stop);
+    if (options_.loop.enabled && LinkRevisits(should_stop)) bundle = mapper_.Finish(should_stop);
+  }
   if (backfiller_.has_value()) tracked_.AddFound(Backfill(tracked_.Poses(), false, should_stop));
   if (refiner_.has_value() && changes_map) {
     MotionNoises noises;
@@ -341,6 +346,12 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
       mapped_.Write()->clear();
     }
   }
+}
+
+bool SlamSystem::LinkRevisits(const std::function<bool()>& should_stop) {
+  const int links = RevisitFinder(camera(), options_.tracker, &map_).LinkAll(should_stop);
+  loop_report_.Write()->revisit_links = links;
+  return links > 0;
 }
 
 void SlamSystem::RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises) {

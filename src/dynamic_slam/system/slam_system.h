@@ -57,6 +57,7 @@ struct LoopReport {
   int corrected = 0;  // loops after which the map was moved
   int joined = 0;     // of these, those that made one of two parts of the map
   int landmarks_merged = 0;
+  int revisit_links = 0;                 // of keyframes to what the map has from another time, at the end
   int bundles = 0, bundles_stopped = 0;  // adjustments of the whole map after that
   std::vector<double> times_ms;          // of each keyframe, and each border, that was looked at
 };
@@ -161,6 +162,8 @@ class SlamSystem {
   void CloseBorders(const std::function<bool()>& should_stop);
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
+  // Links keyframes to what the map has of the same things from another time; whether there are such.
+  bool LinkRevisits(const std::function<bool()>& should_stop);
   // Adjusts the map to what frames see that are tracked once more in it. noises: gets how the camera was
   // moved, where that is known.
   void RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises);

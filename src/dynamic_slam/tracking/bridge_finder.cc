@@ -14,8 +14,8 @@ namespace dynamic_slam {
 namespace {
 
 // Keyframes that share most with one, on either side of a border: the map about that one. Across a border
-// no two share more than what is there by chance, as loops have it (LoopOptions::covisible_weight).
-constexpr int kNeighbours = 10, kByChance = 15;
+// no two share more than what is there by chance.
+constexpr int kNeighbours = 10;
 
 // Keyframes on either side of a border that are looked for from the other. Those beside it are from the turn
 // in which the camera was lost, and show the least.
@@ -73,7 +73,7 @@ bool BridgeFinder::IsOpen(const Border& border) const {
   const std::vector<KeyframeId> before = MapAbout(*map, border.before), after = MapAbout(*map, border.after);
   return std::find_first_of(before.begin(), before.end(), after.begin(), after.end(),
                             [&](KeyframeId a, KeyframeId b) {
-                              return a == b || map->keyframes().At(a).WeightOf(b) > kByChance;
+                              return a == b || map->keyframes().At(a).WeightOf(b) > kSharedByChance;
                             }) == before.end();
 }
 
@@ -136,7 +136,8 @@ Bridge BridgeFinder::Find(const KnownPoses& known, const Border& border) {
   const Rigid3 motion =
       best->cam_from_there * map->keyframes().At(bridge.neighbour).cam_from_world().Inverse();
   bridge.keyframe_from_neighbour = ScaleBy(best->is_after ? scale : 1 / scale) * ToSim3(motion);
-  bridge.drift_px = AwayFromLinks_px(*map, bridge, map->keyframes().At(bridge.keyframe).cam_from_world());
+  const Keyframe& keyframe = map->keyframes().At(bridge.keyframe);
+  bridge.drift_px = AwayFromLinks_px(camera_, *map, keyframe, bridge.links, keyframe.cam_from_world());
   return bridge;
 }
 
@@ -163,9 +164,7 @@ void BridgeFinder::Look(const KnownPoses& known, const AnchoredPose& from, const
     {
       const auto map = map_->Read();
       const Keyframe& keyframe = map->keyframes().At(id);
-      frame.features = keyframe.features();
-      frame.grid = keyframe.grid();
-      frame.static_probability = keyframe.static_probability();
+      frame = FrameOf(keyframe);
       keyframe_from_frame =
           keyframe.cam_from_world() * map->PoseFromReference(to.reference, to.cam_from_reference).Inverse();
     }
@@ -239,21 +238,8 @@ int BridgeFinder::CountAgreeing(const std::vector<Sighting>& sightings, const Si
     const Sim3 here_from_there = sighting.is_after ? after_from_before : after_from_before.Inverse();
     const Keyframe& keyframe = map->keyframes().At(sighting.bridge.keyframe);
     const Rigid3 by_similarity = ToRigid3(ToSim3(keyframe.cam_from_world()) * here_from_there);
-    return AwayFromLinks_px(*map, sighting.bridge, by_similarity) <= kAgreement_px;
+    return AwayFromLinks_px(camera_, *map, keyframe, sighting.bridge.links, by_similarity) <= kAgreement_px;
   }));
-}
-
-double BridgeFinder::AwayFromLinks_px(const Map& map, const Bridge& bridge,
-                                      const Rigid3& cam_from_world) const {
-  const Keyframe& keyframe = map.keyframes().At(bridge.keyframe);
-  std::vector<double> away_px;
-  for (const auto& [keypoint, landmark] : bridge.links) {
-    const Eigen::Vector3d x = cam_from_world * map.landmarks().At(landmark).position();
-    const Keypoint& seen = keyframe.keypoint(keypoint);
-    away_px.push_back(x.z() > 0 ? (camera_.Project(x) - Eigen::Vector2d(seen.x, seen.y)).norm()
-                                : camera_.width);
-  }
-  return away_px.empty() ? camera_.width : Percentile(0.5, &away_px);
 }
 
 }  // namespace dynamic_slam

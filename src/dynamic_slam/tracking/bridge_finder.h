@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "dynamic_slam/geometry/sim3.h"
 #include "dynamic_slam/map/shared_map.h"
+#include "dynamic_slam/tracking/keypoint_links.h"
 #include "dynamic_slam/tracking/known_poses.h"
 #include "dynamic_slam/tracking/map_localiser.h"
 
@@ -19,7 +19,7 @@ struct Bridge {
   KeyframeId keyframe, neighbour;  // on either side
   Sim3 keyframe_from_neighbour;    // cameras, each in the map's unit of length about it
   // Keypoints of the keyframe that show landmarks of the neighbour's side.
-  std::vector<std::pair<uint32_t, LandmarkId>> links;
+  KeypointLinks links;
   int common = 0;       // landmarks of both sides, by which the scale is known
   double drift_px = 0;  // from where the map has the links' landmarks to their keypoints, median
   std::string reason;   // why it is none; empty when it is one
@@ -70,8 +70,6 @@ class BridgeFinder {
   // How many sightings see what they see where the similarity (world after the border from world before it)
   // puts it.
   int CountAgreeing(const std::vector<Sighting>& sightings, const Sim3& after_from_before) const;
-  // Median, from where the keyframe's pose has the links' landmarks to their keypoints.
-  double AwayFromLinks_px(const Map& map, const Bridge& bridge, const Rigid3& cam_from_world) const;
 
   Camera camera_;
   TrackerOptions options_;
