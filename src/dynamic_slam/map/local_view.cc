@@ -109,7 +109,6 @@ void LocalViewBuilder::CollectLandmarks(const Map& map) {
 }
 
 void LocalViewBuilder::CopyLandmarks(const Map& map, LocalView* view) {
-  slots_.resize(kSlots);
   view->near.clear();
   copied_.clear();
   for (const LandmarkId id : landmarks_) {
@@ -135,7 +134,7 @@ void LocalViewBuilder::CopyLandmarks(const Map& map, LocalView* view) {
 }
 
 void LocalViewBuilder::ForgetCopies(LocalView* view) {
-  slots_.resize(kSlots);
+  slots_.resize(kSlots);  // the first time
   for (const LandmarkId id : view->ids) slots_[id.value() % kSlots] = {};
   view->ids.clear();
   view->positions.clear();

@@ -42,7 +42,7 @@ class LocalViewBuilder {
   void Build(const Map& map, uint64_t writes, const std::vector<LandmarkId>& seen, int max_keyframes,
              LocalView* view);
 
-  // The landmarks given, and no keyframe.
+  // The landmarks given, and no keyframe. Copied anew, so that the copies may be changed.
   void Copy(const Map& map, const std::vector<LandmarkId>& landmarks, LocalView* view);
 
  private:

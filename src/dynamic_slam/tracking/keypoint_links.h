@@ -15,8 +15,8 @@ using KeypointLinks = std::vector<std::pair<uint32_t, LandmarkId>>;
 // (LoopOptions::covisible_weight).
 inline constexpr int kSharedByChance = 15;
 
-// Median, from where a pose of the keyframe has the landmarks to their keypoints; the image's width where
-// there is no link, or a landmark is behind.
+// Median, from where a pose of the keyframe has the landmarks to their keypoints: the image's width for one
+// that is behind, and where there is no link.
 double AwayFromLinks_px(const Camera& camera, const Map& map, const Keyframe& keyframe,
                         const KeypointLinks& links, const Rigid3& cam_from_world);
 

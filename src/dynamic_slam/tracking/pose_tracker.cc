@@ -12,7 +12,6 @@ namespace {
 // Nearest over second nearest distance of a landmark's candidates in one octave.
 constexpr double kWindowRatio = 0.8;
 constexpr double kKeyframeRatio = 0.85;
-constexpr int kKeyframeDistance = (kStrictDistance + kLooseDistance) / 2;
 
 }  // namespace
 

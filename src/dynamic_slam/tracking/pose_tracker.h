@@ -15,6 +15,9 @@
 
 namespace dynamic_slam {
 
+// Most that descriptors differ where nothing, or little, says where to look.
+inline constexpr int kKeyframeDistance = (kStrictDistance + kLooseDistance) / 2;
+
 // Finds a frame's pose from landmarks: matching, then Eq. (10). Each Track* leaves the pose and the landmarks
 // that fit it in the frame and returns how many they are, each counting as much as it can be trusted to be at
 // rest (TrustInMatch).

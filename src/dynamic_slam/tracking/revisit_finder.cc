@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "dynamic_slam/base/trace.h"
-#include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/map/landmark_fusion.h"
 
 namespace dynamic_slam {
@@ -27,7 +26,7 @@ constexpr double kReach = 4;
 
 // Far from a prediction more look alike: as for keyframes that are matched by looks.
 TrackerOptions WithStricterMatches(TrackerOptions options) {
-  options.max_match_distance = std::min(options.max_match_distance, (kStrictDistance + kLooseDistance) / 2);
+  options.max_match_distance = std::min(options.max_match_distance, kKeyframeDistance);
   return options;
 }
 
@@ -58,17 +57,20 @@ RevisitFinder::RevisitFinder(const Camera& camera, const TrackerOptions& options
 int RevisitFinder::LinkAll(const std::function<bool()>& should_stop) {
   DS_TRACE("revisits");
   FindViewpoints();
-  revisits_.clear();
-  revisits_of_.assign(map_->Read()->keyframes().CreatedCount(), {});
+  revisits_.assign(map_->Read()->keyframes().CreatedCount(), {});
   for (const Viewpoint& viewpoint : viewpoints_) {
     if (should_stop && should_stop()) return 0;
-    if (viewpoint.is_of_this_run) FindRevisits(viewpoint);
+    if (viewpoint.is_of_this_run) revisits_[viewpoint.id.value()] = RevisitsOf(viewpoint);
   }
-  std::vector<uint8_t> stands(revisits_.size());
-  for (size_t i = 0; i < revisits_.size(); ++i)
-    stands[i] = revisits_[i].inliers >= options_.min_inliers || IsConfirmed(*map_->Read(), revisits_[i]);
+  std::vector<const Revisit*> believed;  // before links change who shares what
+  for (const Viewpoint& viewpoint : viewpoints_) {
+    for (const Revisit& revisit : revisits_[viewpoint.id.value()]) {
+      if (revisit.inliers >= options_.min_inliers || IsConfirmed(*map_->Read(), revisit))
+        believed.push_back(&revisit);
+    }
+  }
   int links = 0;
-  for (size_t i = 0; i < revisits_.size(); ++i) links += stands[i] != 0 ? Link(revisits_[i]) : 0;
+  for (const Revisit* revisit : believed) links += Link(*revisit);
   return links;
 }
 
@@ -88,7 +90,8 @@ bool RevisitFinder::Overlap::IsKnown(KeyframeId other) const {
          seen[other.value()] >= kMostSeenOfStrangers * visible[other.value()];
 }
 
-void RevisitFinder::FindRevisits(const Viewpoint& viewpoint) {
+std::vector<RevisitFinder::Revisit> RevisitFinder::RevisitsOf(const Viewpoint& viewpoint) {
+  std::vector<Revisit> revisits;
   const auto map = map_->Read();
   const Keyframe& keyframe = map->keyframes().At(viewpoint.id);
   const Overlap overlap = OverlapOf(*map, viewpoint);
@@ -106,27 +109,32 @@ void RevisitFinder::FindRevisits(const Viewpoint& viewpoint) {
       most_missed = missed;
       best = other.id;
     }
-    if (!best.IsValid()) return;
-    std::vector<KeyframeId> of_visit{best};
-    for (const CovisibleKeyframe& other : map->keyframes().At(best).BestCovisible(kVisitKeyframes)) {
-      if (is_open(other.id)) of_visit.push_back(other.id);
-    }
+    if (!best.IsValid()) break;
     std::vector<uint8_t> is_of_visit(is_done.size());
-    for (const KeyframeId other : of_visit) is_of_visit[other.value()] = is_done[other.value()] = 1;
-    // Without those that a keyframe shows that is known: they are where the map about ours has them.
-    std::vector<LandmarkId> landmarks;
-    for (const LandmarkId id : overlap.unseen) {
-      const std::vector<Observation>& observations = map->landmarks().At(id).observations();
-      const auto is_by = [&](auto&& is_such) { return std::ranges::any_of(observations, is_such); };
-      if (is_by([&](const Observation& o) { return is_of_visit[o.keyframe.value()] != 0; }) &&
-          !is_by([&](const Observation& o) { return overlap.IsKnown(o.keyframe); }))
-        landmarks.push_back(id);
+    const auto take = [&](KeyframeId other) { is_of_visit[other.value()] = is_done[other.value()] = 1; };
+    take(best);
+    for (const CovisibleKeyframe& other : map->keyframes().At(best).BestCovisible(kVisitKeyframes)) {
+      if (is_open(other.id)) take(other.id);
     }
-    if (std::optional<Revisit> revisit = Locate(*map, keyframe, landmarks); revisit.has_value()) {
-      revisits_of_[viewpoint.id.value()].push_back(revisits_.size());
-      revisits_.push_back(std::move(*revisit));
-    }
+    std::optional<Revisit> revisit = Locate(*map, keyframe, OfVisit(*map, overlap, is_of_visit));
+    if (revisit.has_value()) revisits.push_back(std::move(*revisit));
   }
+  return revisits;
+}
+
+// Without those that a keyframe shows that is known: they are where the map about ours has them.
+std::vector<LandmarkId> RevisitFinder::OfVisit(const Map& map, const Overlap& overlap,
+                                               const std::vector<uint8_t>& is_of_visit) {
+  std::vector<LandmarkId> landmarks;
+  for (const LandmarkId id : overlap.unseen) {
+    bool is_by_visit = false, is_known = false;
+    for (const Observation& observation : map.landmarks().At(id).observations()) {
+      is_by_visit |= is_of_visit[observation.keyframe.value()] != 0;
+      is_known |= overlap.IsKnown(observation.keyframe);
+    }
+    if (is_by_visit && !is_known) landmarks.push_back(id);
+  }
+  return landmarks;
 }
 
 RevisitFinder::Overlap RevisitFinder::OverlapOf(const Map& map, const Viewpoint& viewpoint) {
@@ -210,9 +218,9 @@ bool RevisitFinder::IsConfirmed(const Map& map, const Revisit& revisit) const {
   return std::ranges::any_of(keyframe.covisible(), [&](const CovisibleKeyframe& neighbour) {
     if (neighbour.weight <= kSharedByChance) return false;
     const Keyframe& beside = map.keyframes().At(neighbour.id);
-    return std::ranges::any_of(revisits_of_[neighbour.id.value()], [&](size_t other) {
-      return AwayFromLinks_px(camera_, map, beside, revisits_[other].links,
-                              beside.cam_from_world() * here_from_there) <= options_.local_map_radius_px;
+    return std::ranges::any_of(revisits_[neighbour.id.value()], [&](const Revisit& other) {
+      return AwayFromLinks_px(camera_, map, beside, other.links, beside.cam_from_world() * here_from_there) <=
+             options_.local_map_radius_px;
     });
   });
 }

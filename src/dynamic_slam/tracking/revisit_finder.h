@@ -28,7 +28,7 @@ class RevisitFinder {
   int LinkAll(const std::function<bool()>& should_stop);
 
  private:
-  // Where a keyframe of this run is, and how far it looks.
+  // Where a keyframe is, and how far it looks.
   struct Viewpoint {
     KeyframeId id;
     PartId part;
@@ -54,11 +54,14 @@ class RevisitFinder {
   };
 
   void FindViewpoints();
-  void FindRevisits(const Viewpoint& viewpoint);
+  std::vector<Revisit> RevisitsOf(const Viewpoint& viewpoint);
   Overlap OverlapOf(const Map& map, const Viewpoint& viewpoint);
   // By id: whether the keyframe is of the same time as the viewpoint, from which the camera has not been
   // away.
   std::vector<uint8_t> OfSameTime(const Map& map, const Viewpoint& viewpoint, const Overlap& overlap) const;
+  // Those that the keyframes of a visit, by id, show of what is not seen.
+  static std::vector<LandmarkId> OfVisit(const Map& map, const Overlap& overlap,
+                                         const std::vector<uint8_t>& is_of_visit);
   std::optional<Revisit> Locate(const Map& map, const Keyframe& keyframe,
                                 const std::vector<LandmarkId>& landmarks);
   bool IsConfirmed(const Map& map, const Revisit& revisit) const;
@@ -72,9 +75,8 @@ class RevisitFinder {
   LocalViewBuilder view_builder_;
   LocalView view_;
   std::vector<uint8_t> in_view_;
-  std::vector<Viewpoint> viewpoints_;             // in the order of time
-  std::vector<Revisit> revisits_;                 // those of a keyframe one after the other
-  std::vector<std::vector<size_t>> revisits_of_;  // by keyframe id
+  std::vector<Viewpoint> viewpoints_;           // in the order of time
+  std::vector<std::vector<Revisit>> revisits_;  // by keyframe id
 };
 
 }  // namespace dynamic_slam
