@@ -1,6 +1,8 @@
 #include "dynamic_slam/tracking/dynamic_filter.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -46,6 +48,9 @@ const double kMostObjectEvidence = std::log(0.95 / 0.05);
 
 // No class is surer than that.
 constexpr double kMostProbability = 0.99;
+
+// Bits of a word: so many objects are told apart, and all beyond them count as one.
+constexpr size_t kMaxToldApart = 32;
 
 double Sigmoid(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
@@ -114,15 +119,13 @@ float DynamicFilter::Combine(float prior, float motion_log_odds) const {
 }
 
 void DynamicFilter::CombineAll(Frame* frame) {
-  // Most are in no box and nobody asked them how they move.
-  const float prior = Prior(1);
   const size_t n = by_boxes_.prior.size();
-  frame->static_probability.assign(n, Combine(prior, 0));
+  frame->static_probability = by_boxes_.unmoved;
   chosen_.resize(n);
   size_t count = 0;
   for (uint32_t i = 0; i < n; ++i) {
     chosen_[count] = i;
-    count += static_cast<size_t>((by_boxes_.prior[i] != prior) | (frame->motion_log_odds[i] != 0));
+    count += static_cast<size_t>(frame->motion_log_odds[i] != 0);
   }
   for (const uint32_t i : std::span(chosen_).first(count)) {
     frame->static_probability[i] = Combine(by_boxes_.prior[i], frame->motion_log_odds[i]);
@@ -163,9 +166,8 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
     return counts;
   }
   if (weights && options_.motion) {
-    for (size_t i = 0; i < n; ++i) {
-      const uint32_t from = flow.last_keypoints()[i];
-      if (from != kNotFollowed) frame->motion_log_odds[i] = last.motion_log_odds[from];
+    for (const uint32_t i : flow.followed()) {
+      frame->motion_log_odds[i] = last.motion_log_odds[flow.last_keypoints()[i]];
     }
     if (flow.IsOfWitnesses()) ShareInCells(frame->grid, flow.last_keypoints(), frame->motion_log_odds);
   }
@@ -178,9 +180,11 @@ DynamicKeypoints DynamicFilter::Judge(std::span<const DynamicBox> boxes, const K
   if (options_.method == "paper") JudgeByDisplacement(flow, last, frame);
   DynamicKeypoints counts;
   for (size_t i = 0; i < n; ++i) {
-    const bool used = frame->static_probability[i] >= kMinStaticProbability;
-    ++(by_boxes_.in_box[i] == 0 ? counts.outside : used ? counts.kept : counts.culled);
+    const int in_box = by_boxes_.in_box[i] != 0;
+    counts.outside += 1 - in_box;
+    counts.kept += in_box & static_cast<int>(frame->static_probability[i] >= kMinStaticProbability);
   }
+  counts.culled = static_cast<int>(n) - counts.outside - counts.kept;
   return counts;
 }
 
@@ -213,32 +217,48 @@ double DynamicFilter::MarginOf(const Box& box) const {
 }
 
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
-// of these objects, each as likely as the other. However many overlap, motion can still overrule them. Who is
-// in a box is found without branches: where keypoints are is hard to predict.
+// of these objects, each as likely as the other. However many overlap, motion can still overrule them.
+float DynamicFilter::PriorIn(uint32_t boxes, std::span<const Object> objects) const {
+  double belongs_to_none = 1, sum_moves = 0;
+  for (uint32_t left = boxes; left != 0; left &= left - 1) {
+    belongs_to_none *= 1 - options_.object_share;
+    sum_moves += objects[static_cast<size_t>(std::countr_zero(left))].moves;
+  }
+  return Prior(1 - (1 - belongs_to_none) * sum_moves / std::popcount(boxes));
+}
+
 void DynamicFilter::JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features,
                                  ByBoxes* result) const {
+  result->marks.Begin(features);
+  for (size_t k = 0; k < objects.size(); ++k) {
+    if (!objects[k].IsMoving()) continue;
+    const uint32_t bit = uint32_t{1} << std::min(k, kMaxToldApart - 1);
+    result->marks.Mark(objects[k].box.box, objects[k].margin_px, outlines_px_, bit);
+  }
+  // Thousands of keypoints are in a few sets of boxes.
+  struct InBoxes {
+    uint32_t boxes = 0, in_box = 0;
+    float prior = 0, unmoved = 0;
+  };
+  constexpr int kSlotBits = 6;
+  std::array<InBoxes, 1 << kSlotBits> known;
+  known.fill({0, 0, Prior(1), Combine(Prior(1), 0)});
   const size_t n = features.size();
-  result->in_box.assign(n, 0);
-  result->prior.assign(n, Prior(1));
-  result->chances.assign(n, {});
-  result->inside.resize(n);
-  for (const Object& object : objects) {
-    if (!object.IsMoving()) continue;
-    size_t count = 0;
-    for (uint32_t i = 0; i < n; ++i) {
-      const Keypoint& keypoint = features.keypoints[i];
-      const double reach_px = object.margin_px + outlines_px_[static_cast<size_t>(keypoint.octave)];
-      result->inside[count] = i;
-      count += static_cast<size_t>(object.box.box.Contains(keypoint.raw_x, keypoint.raw_y, reach_px));
+  result->in_box.resize(n);
+  result->prior.resize(n);
+  result->unmoved.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    const uint32_t boxes = result->marks.bits()[i];
+    InBoxes& slot = known[boxes * 0x9e3779b1u >> (32 - kSlotBits)];  // Fibonacci hashing
+    if (slot.boxes != boxes) {
+      slot = {boxes, 0, PriorIn(boxes, objects), 0};
+      slot.unmoved = Combine(slot.prior, 0);
+      for (uint32_t left = boxes; left != 0; left &= left - 1)
+        slot.in_box |= objects[static_cast<size_t>(std::countr_zero(left))].witnesses;
     }
-    for (const uint32_t i : std::span(result->inside).first(count)) {
-      ByBoxes::Chances& chances = result->chances[i];
-      chances.belongs_to_none *= 1 - options_.object_share;
-      chances.sum_moves += object.moves;
-      ++chances.boxes;
-      result->in_box[i] |= object.witnesses;
-      result->prior[i] = Prior(1 - (1 - chances.belongs_to_none) * chances.sum_moves / chances.boxes);
-    }
+    result->in_box[i] = slot.in_box;
+    result->prior[i] = slot.prior;
+    result->unmoved[i] = slot.unmoved;
   }
 }
 
@@ -350,9 +370,9 @@ void DynamicFilter::WatchBeforePose(const KeypointFlow& flow, const Frame& last,
   FindMovers(flow);
   if (movers_.empty()) return;
   std::vector<PointMotion> outside;
-  for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
+  for (const uint32_t i : flow.followed()) {
     const uint32_t from = flow.last_keypoints()[i];
-    if (from == kNotFollowed || frame->static_probability[i] < kMinStaticProbability ||
+    if (frame->static_probability[i] < kMinStaticProbability ||
         last.StaticProbability(from) < kMinStaticProbability) {
       continue;
     }
@@ -373,8 +393,7 @@ template <class Rest>
 void DynamicFilter::WatchKeypoints(const Rest& rest, const KeypointFlow& flow, const Frame& last,
                                    Frame* frame) const {
   const double mismatch = kMismatchShare / (std::numbers::pi * Square(flow.radius_px()));  // 1/px^2
-  for (size_t i = 0; i < flow.last_keypoints().size(); ++i) {
-    if (flow.last_keypoints()[i] == kNotFollowed) continue;
+  for (const uint32_t i : flow.followed()) {
     const Keypoint& now = frame->features.keypoints[i];
     const auto is_around = [&](const Mover& mover) {
       return mover.to.Contains(now.raw_x, now.raw_y, mover.ring_px);

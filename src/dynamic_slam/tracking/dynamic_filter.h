@@ -8,6 +8,7 @@
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/semantics/dynamic_score.h"
 #include "dynamic_slam/semantics/point_motion.h"
+#include "dynamic_slam/tracking/box_marks.h"
 #include "dynamic_slam/tracking/dynamic_options.h"
 #include "dynamic_slam/tracking/keypoint_flow.h"
 #include "dynamic_slam/tracking/past_views.h"
@@ -70,11 +71,11 @@ class DynamicFilter {
   // Something whose class is dynamic.
   struct Object {
     DynamicBox box;
-    double margin_px = 0;         // by which it may reach out of its box
-    uint8_t witnesses = kOfMany;  // WitnessesOf its box
-    double moves = 1;             // P(moves) by its class and its motion so far
-    double motion_log_odds = 0;   // of moving: what its motion tells beside the class
-    ShiftHistory shifts = {};     // while the pose was known
+    double margin_px = 0;          // by which it may reach out of its box
+    uint32_t witnesses = kOfMany;  // WitnessesOf its box
+    double moves = 1;              // P(moves) by its class and its motion so far
+    double motion_log_odds = 0;    // of moving: what its motion tells beside the class
+    ShiftHistory shifts = {};      // while the pose was known
 
     bool IsMoving() const { return moves >= 0.5; }
   };
@@ -89,15 +90,10 @@ class DynamicFilter {
 
   // What the boxes alone say of each keypoint.
   struct ByBoxes {
-    struct Chances {
-      double belongs_to_none = 1, sum_moves = 0;
-      int boxes = 0;
-    };
-    std::vector<uint8_t> in_box;  // WitnessesOf the boxes that it is in
-    std::vector<float> prior;     // P(at rest)
-    // Kept for their memory.
-    std::vector<Chances> chances;
-    std::vector<uint32_t> inside;  // the box in hand
+    std::vector<uint32_t> in_box;  // WitnessesOf the boxes of movers that it is in
+    std::vector<float> prior;      // P(at rest)
+    std::vector<float> unmoved;    // the same of what nobody asked how it moves
+    BoxMarks marks;                // kept for its memory
   };
 
   // Where a point at rest is in this frame: on the segment, by its depth, ideal px.
@@ -112,6 +108,8 @@ class DynamicFilter {
   void CombineAll(Frame* frame);
   double MarginOf(const Box& box) const;
   void JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features, ByBoxes* result) const;
+  // P(at rest) of what is in the boxes of these objects (bits, one or more).
+  float PriorIn(uint32_t boxes, std::span<const Object> objects) const;
   float Prior(double at_rest) const;  // within the bounds of what boxes may say
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.

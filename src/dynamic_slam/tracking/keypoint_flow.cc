@@ -22,6 +22,7 @@ void KeypointFlow::Clear(const Frame& frame) {
   is_of_witnesses_ = false;
   last_keypoints_.assign(frame.features.size(), kNotFollowed);
   distances_.assign(frame.features.size(), kStrictDistance + 1);
+  followed_.clear();
   motions_.clear();
 }
 
@@ -36,23 +37,16 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
   const Eigen::Matrix3d rotation =
       frame_from_last.value_or(Eigen::Quaterniond::Identity()).toRotationMatrix();
   const size_t n = last.features.size();
-  near_.assign(n, 0);
-  for (const Box& box : boxes) {
-    const double reach_px = kReach * std::sqrt(box.Area());
-    const uint8_t witnesses = WitnessesOf(box);
-    for (size_t i = 0; i < n; ++i) {
-      const Keypoint& from = last.features.keypoints[i];
-      near_[i] |= static_cast<uint8_t>(box.Contains(from.raw_x, from.raw_y, reach_px) * witnesses);
-    }
-  }
+  near_.Begin(last.features);
+  for (const Box& box : boxes) near_.Mark(box, kReach * std::sqrt(box.Area()), {}, WitnessesOf(box));
   is_of_witnesses_ = of == Of::kWitnesses;
   if (is_of_witnesses_) {
     if (before_.size() != n) before_.assign(n, kNotFollowed);  // of another frame
-    ChooseWitnesses(last, near_, before_, &asked_);
+    ChooseWitnesses(last, near_.bits(), before_, &asked_);
   } else {
     asked_.clear();
     for (uint32_t i = 0; i < n; ++i) {
-      if (near_[i] != 0) asked_.push_back(i);
+      if (near_.bits()[i] != 0) asked_.push_back(i);
     }
   }
   for (const uint32_t i : asked_) {
@@ -69,8 +63,15 @@ void KeypointFlow::Match(const Frame& last, std::span<const Box> boxes,
     distances_[match.keypoint] = match.distance;
     last_keypoints_[match.keypoint] = i;
   }
+  // Without branches: which of them are is hard to predict.
+  followed_.resize(last_keypoints_.size());
+  size_t count = 0;
   for (uint32_t i = 0; i < last_keypoints_.size(); ++i) {
-    if (last_keypoints_[i] == kNotFollowed) continue;
+    followed_[count] = i;
+    count += static_cast<size_t>(last_keypoints_[i] != kNotFollowed);
+  }
+  followed_.resize(count);
+  for (const uint32_t i : followed_) {
     const Keypoint& from = last.features.keypoints[last_keypoints_[i]];
     const Keypoint& to = frame.features.keypoints[i];
     motions_.push_back({{from.raw_x, from.raw_y}, {to.raw_x, to.raw_y}});

@@ -10,6 +10,7 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/semantics/point_motion.h"
+#include "dynamic_slam/tracking/box_marks.h"
 
 namespace dynamic_slam {
 
@@ -38,8 +39,9 @@ class KeypointFlow {
   // No matches.
   void Clear(const Frame& frame);
 
-  // For each keypoint of the frame the one of the last frame, or kNotFollowed.
+  // For each keypoint of the frame the one of the last frame, or kNotFollowed; and those that have one.
   const std::vector<uint32_t>& last_keypoints() const { return last_keypoints_; }
+  std::span<const uint32_t> followed() const { return followed_; }
 
   bool IsOfWitnesses() const { return is_of_witnesses_; }
 
@@ -55,7 +57,8 @@ class KeypointFlow {
   double radius_px_ = 1;
   bool is_of_witnesses_ = false;
   std::vector<uint32_t> last_keypoints_, before_;  // before_: those of the last frame
-  std::vector<uint8_t> near_;    // of the last frame's keypoints: WitnessesOf the boxes about it
+  std::vector<uint32_t> followed_;
+  BoxMarks near_;                // on the last frame's keypoints: WitnessesOf the boxes about them
   std::vector<uint32_t> asked_;  // of them
   std::vector<int> distances_;
   std::vector<PointMotion> motions_;

@@ -7,7 +7,7 @@ namespace dynamic_slam {
 
 // Without branches for single keypoints, as which of them are candidates, known or followed is hard to
 // predict.
-void ChooseWitnesses(const Frame& frame, std::span<const uint8_t> candidates,
+void ChooseWitnesses(const Frame& frame, std::span<const uint32_t> candidates,
                      std::span<const uint32_t> last_keypoints, std::vector<uint32_t>* witnesses) {
   constexpr float kFollowed = 256;  // more than any FAST score
   witnesses->resize(frame.features.size());

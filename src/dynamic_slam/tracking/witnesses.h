@@ -14,12 +14,12 @@ namespace dynamic_slam {
 inline constexpr uint32_t kNotFollowed = 0xffffffffu;
 
 // Bits of a keypoint: in or around a box that shows few cells of the grid, or in another one.
-inline constexpr uint8_t kOfFew = 1, kOfMany = 2;
+inline constexpr uint32_t kOfFew = 1, kOfMany = 2;
 
 // The bit of a box. How an object moves is a median over its keypoints, and how it grows one over ten pairs
 // of them in the middle half of its box (BoxMotionEstimator). With one keypoint of a cell, and a third of
 // them found in the next frame, that takes sixty cells.
-inline uint8_t WitnessesOf(const Box& box) {
+inline uint32_t WitnessesOf(const Box& box) {
   constexpr double kFewCells = 60;
   return box.Area() < kFewCells * KeypointGrid::kCellSizePx * KeypointGrid::kCellSizePx ? kOfFew : kOfMany;
 }
@@ -29,7 +29,7 @@ inline uint8_t WitnessesOf(const Box& box) {
 // all that show a landmark, as the pose hangs on them; in a cell without, one: rather one that was followed
 // from the last frame, as it knows more, and the strongest corner of these. last_keypoints: of each keypoint,
 // the one of the last frame or kNotFollowed.
-void ChooseWitnesses(const Frame& frame, std::span<const uint8_t> candidates,
+void ChooseWitnesses(const Frame& frame, std::span<const uint32_t> candidates,
                      std::span<const uint32_t> last_keypoints, std::vector<uint32_t>* witnesses);
 
 // Gives keypoints that were not followed the mean log-odds of those in their cell that were. A cell is small,

@@ -43,7 +43,7 @@ class WitnessesTest : public ::testing::Test {
   Frame frame_;
   std::vector<uint32_t> last_keypoints_;
   std::vector<bool> has_landmark_;
-  std::vector<uint8_t> candidates_;
+  std::vector<uint32_t> candidates_;
 };
 
 TEST_F(WitnessesTest, InACellTheStrongestCornerOfThoseThatWereFollowed) {
