@@ -219,6 +219,7 @@ double DynamicFilter::MarginOf(const Box& box) const {
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other. However many overlap, motion can still overrule them.
 float DynamicFilter::PriorIn(uint32_t boxes, std::span<const Object> objects) const {
+  if (boxes == 0) return Prior(1);
   double belongs_to_none = 1, sum_moves = 0;
   for (uint32_t left = boxes; left != 0; left &= left - 1) {
     belongs_to_none *= 1 - options_.object_share;

@@ -108,7 +108,7 @@ class DynamicFilter {
   void CombineAll(Frame* frame);
   double MarginOf(const Box& box) const;
   void JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features, ByBoxes* result) const;
-  // P(at rest) of what is in the boxes of these objects (bits, one or more).
+  // P(at rest) of what is in the boxes of these objects (bits).
   float PriorIn(uint32_t boxes, std::span<const Object> objects) const;
   float Prior(double at_rest) const;  // within the bounds of what boxes may say
   void FindMovers(const KeypointFlow& flow);

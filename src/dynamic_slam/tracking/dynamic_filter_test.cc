@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -122,6 +125,47 @@ TEST_F(DynamicFilterTest, ACarThatDoesNotMoveIsParked) {
   EXPECT_EQ(later.InBoxes(), 0);
   EXPECT_FALSE(filter.IsHidden({500, 200}));
   EXPECT_EQ(filter.Boxes().size(), 1u) << "it is watched on";
+}
+
+TEST_F(DynamicFilterTest, AKeypointIsJudgedByTheBoxesThatItIsInAlone) {
+  Random random(5);
+  std::vector<DynamicBox> boxes;
+  for (int k = 0; k < 24; ++k) {
+    DynamicBox box = Person(0);
+    box.box = {random.Uniform(0, 500), random.Uniform(0, 350), random.Uniform(50, 200),
+               random.Uniform(50, 200)};
+    box.track_id = k;
+    boxes.push_back(box);
+  }
+  flow_.Clear(frame_);
+  const auto judge = [&](const std::vector<DynamicBox>& of) {
+    Frame frame = frame_;
+    DynamicFilter filter = Make("weights");
+    filter.Judge(of, flow_, last_, &frame);
+    return frame.static_probability;
+  };
+  const DynamicBox elsewhere = [&] {
+    DynamicBox box = Person(0);
+    box.box = {-900, -900, 10, 10};
+    return box;
+  }();
+  const float in_none = judge({elsewhere})[0];
+  std::vector<int> in_boxes(frame_.features.size());
+  for (const DynamicBox& box : boxes) {
+    const std::vector<float> by_one = judge({box});
+    for (size_t i = 0; i < by_one.size(); ++i) in_boxes[i] += by_one[i] != in_none;
+  }
+  // All are as likely to move, so that what counts is how many they are.
+  const std::vector<float> by_all = judge(boxes);
+  std::map<int, float> by_count{{0, in_none}};
+  for (size_t i = 0; i < by_all.size(); ++i) {
+    EXPECT_EQ(by_all[i], by_count.emplace(in_boxes[i], by_all[i]).first->second) << i;
+  }
+  EXPECT_GT(by_count.size(), 5u);
+  EXPECT_GT(std::ranges::count(in_boxes, 0), 20);
+  for (auto count = std::next(by_count.begin()); count != by_count.end(); ++count) {
+    EXPECT_LE(count->second, std::prev(count)->second);
+  }
 }
 
 TEST_F(DynamicFilterTest, ACarThatDrivesCountsAsMovingForSure) {
