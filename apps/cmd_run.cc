@@ -320,7 +320,9 @@ void RunSource(const RunArguments& arguments, int* exit_code) {
     WriteRunReport(out, out.filename().string(), system, summary, recorder.Finish(summary, truth));
   });
   PrintSummary(summary);
-  if (truth.has_value()) files.Try([&] { ReportTruth(*truth, system.FrameTrajectory(), out); });
+  if (truth.has_value()) {
+    files.Try([&] { ReportTruth(*truth, system.FrameTrajectory(), system.LiveTrajectory(), out); });
+  }
   if (!arguments.trace.empty()) files.Try([&] { EndTrace(arguments.trace); });
   if (!has_results)
     console.Say(fmt::format("Make space; dynamic_slam recover {} then writes the path.", out.string()));

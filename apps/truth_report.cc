@@ -21,11 +21,14 @@ std::optional<Trajectory> FindTruth(const std::filesystem::path& source) {
   }
 }
 
-void ReportTruth(const Trajectory& truth, const Trajectory& estimate, const std::filesystem::path& out) {
+void ReportTruth(const Trajectory& truth, const Trajectory& estimate, const Trajectory& live,
+                 const std::filesystem::path& out) {
   if (estimate.empty()) return;
   try {
     const TruthComparison comparison = CompareWithTruth(truth, estimate);
-    fmt::print("APE against the ground truth, after sim(3) alignment: {}\n", DescribeApe(comparison));
+    const std::optional<std::string> live_ape = DescribeLiveApe(truth, estimate, live);
+    fmt::print("APE against the ground truth, after sim(3) alignment: {}{}\n", DescribeApe(comparison),
+               live_ape.has_value() ? "; " + *live_ape : "");
     TrajectoryPlot plot = PlotOverTruth(comparison, estimate);
     plot.title = fmt::format("{}: APE {}", out.filename().string(), DescribeApe(comparison));
     WritePicture((out / "trajectory.png").string(), DrawPlot(plot, kPictureWidthPx, kPictureHeightPx));

@@ -11,7 +11,9 @@ namespace dynamic_slam {
 // where it cannot be read, as the run is as good.
 std::optional<Trajectory> FindTruth(const std::filesystem::path& source);
 
-// Prints the error and draws trajectory.png into `out`; else, the reason why there is no error.
-void ReportTruth(const Trajectory& truth, const Trajectory& estimate, const std::filesystem::path& out);
+// Prints the error, also that of the frames tracked live (`live`, of the estimate), and draws trajectory.png
+// into `out`; else, the reason why there is no error.
+void ReportTruth(const Trajectory& truth, const Trajectory& estimate, const Trajectory& live,
+                 const std::filesystem::path& out);
 
 }  // namespace dynamic_slam

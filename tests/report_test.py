@@ -153,7 +153,11 @@ class ReportTest(unittest.TestCase):
         plots = self.check(os.path.join(out, "report.html"), 400)
         self.assertEqual(plots["Path"]["truth"], 0)
         self.assertNotIn("Errors", plots)
-        self.assertIn("APE", run_program("run", images, "--detector", "none", "--truth", truth, "--out", out, "--quiet"))
+        with_truth = ["run", images, "--detector", "none", "--truth", truth, "--out", out, "--quiet"]
+        all_live = run_program(*with_truth, "--no-backfill")
+        self.assertIn("APE", all_live)
+        self.assertNotIn("tracked live", all_live)
+        self.assertRegex(run_program(*with_truth), r"APE .*; \d\.\d{4} m over the frames tracked live\n")
         self.assertEqual(self.check(os.path.join(out, "report.html"), 400)["Path"]["truth"], 2)
 
     def test_a_run_without_a_pose_has_a_report(self):

@@ -73,9 +73,11 @@ Json TilesSection(const Run& run) {
   if (run.truth.has_value()) {
     const TruthComparison& truth = *run.truth;
     const double rmse = truth.ape.translation_m.rmse;
-    tiles.push_back(
-        Tile("absolute pose error", fmt::format("{:.3g} m", rmse),
-             fmt::format("rmse; {:.2f}% of the path of {:.4g} m", 100 * rmse / truth.path_m, truth.path_m)));
+    const std::optional<std::string> live =
+        DescribeLiveApe(*run.record.truth, run.path, run.system.LiveTrajectory());
+    tiles.push_back(Tile("absolute pose error", fmt::format("{:.3g} m", rmse),
+                         fmt::format("rmse; {:.2f}% of the path of {:.4g} m{}", 100 * rmse / truth.path_m,
+                                     truth.path_m, live.has_value() ? "; " + *live : "")));
   }
   if (!run.relative.empty()) {
     double squares = 0;

@@ -4,6 +4,8 @@
 
 #include <fmt/core.h>
 
+#include "dynamic_slam/base/error.h"
+
 namespace dynamic_slam {
 
 TruthComparison CompareWithTruth(const Trajectory& truth, const Trajectory& estimate) {
@@ -23,6 +25,17 @@ std::string DescribeApe(const TruthComparison& comparison) {
   const double rmse = comparison.ape.translation_m.rmse;
   return fmt::format("rmse {:.4f} m ({:.2f}% of the path of {:.2f} m)", rmse, 100 * rmse / comparison.path_m,
                      comparison.path_m);
+}
+
+std::optional<std::string> DescribeLiveApe(const Trajectory& truth, const Trajectory& estimate,
+                                           const Trajectory& live) {
+  if (live.size() == estimate.size()) return std::nullopt;
+  try {
+    return fmt::format("{:.4f} m over the frames tracked live",
+                       CompareWithTruth(truth, live).ape.translation_m.rmse);
+  } catch (const InputError&) {  // too few
+    return std::nullopt;
+  }
 }
 
 TrajectoryPlot PlotOverTruth(const TruthComparison& comparison, const Trajectory& estimate) {

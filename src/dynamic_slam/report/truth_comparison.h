@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "dynamic_slam/eval/metrics.h"
@@ -23,6 +24,11 @@ TruthComparison CompareWithTruth(const Trajectory& truth, const Trajectory& esti
 
 // "rmse 0.0123 m (0.45% of the path of 2.7 m)".
 std::string DescribeApe(const TruthComparison& comparison);
+
+// The same of the frames that were tracked when their turn came, where others were given a pose later:
+// "0.0111 m over the frames tracked live". Nothing where there are none, or too few.
+std::optional<std::string> DescribeLiveApe(const Trajectory& truth, const Trajectory& estimate,
+                                           const Trajectory& live);
 
 // The truth and, moved onto it, the estimate.
 TrajectoryPlot PlotOverTruth(const TruthComparison& comparison, const Trajectory& estimate);

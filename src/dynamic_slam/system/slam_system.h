@@ -118,7 +118,8 @@ class SlamSystem {
   Trajectory FrameTrajectory(PartId part = {}) const;
   Trajectory KeyframeTrajectory(PartId part = {}) const;  // without those of a map that was loaded
 
-  // Frames of FrameTrajectory that had their pose when their turn came.
+  // Those frames of the main part that had their pose when their turn came.
+  Trajectory LiveTrajectory() const { return tracked_.LivePathOf(OrMain({})); }
   size_t LiveFrameCount() const { return tracked_.LiveCountOf(OrMain({})); }
 
   // Pieces of the path that stood wrong in the map: since Finish() their frames have their poses in the rest

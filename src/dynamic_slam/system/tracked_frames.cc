@@ -295,11 +295,14 @@ std::vector<PartId> TrackedFrames::Parts() const {
   return parts;
 }
 
-Trajectory TrackedFrames::PathOf(PartId part) const {
+Trajectory TrackedFrames::PathOf(PartId part) const { return PathOf(part, false); }
+Trajectory TrackedFrames::LivePathOf(PartId part) const { return PathOf(part, true); }
+
+Trajectory TrackedFrames::PathOf(PartId part, bool only_live) const {
   Trajectory path;
   const auto map = map_->Read();
   for (const TrackedFrame& frame : frames_) {
-    if (map->PartOf(frame.reference) != part) continue;
+    if (map->PartOf(frame.reference) != part || (only_live && !frame.is_live)) continue;
     path.push_back({frame.timestamp_s, CamFromWorld(*map, frame.Pose()).Inverse()});
   }
   return path;

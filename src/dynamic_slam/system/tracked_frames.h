@@ -79,6 +79,7 @@ class TrackedFrames {
   // The parts that have frames: the one with the most first.
   std::vector<PartId> Parts() const;
   Trajectory PathOf(PartId part) const;
+  Trajectory LivePathOf(PartId part) const;  // of those that had their pose when their turn came
   size_t LiveCountOf(PartId part) const;
 
  private:
@@ -94,6 +95,7 @@ class TrackedFrames {
     AnchoredPose Pose() const;
   };
 
+  Trajectory PathOf(PartId part, bool only_live) const;
   PartId CutOff(const Piece& piece);
   bool IsElsewhere(const Piece& piece, const Trajectory& found) const;
   bool IsMended(const Piece& piece, const Trajectory& found) const;

@@ -188,6 +188,11 @@ TEST_F(TrackedFramesTest, WhatIsFoundReplacesWhatIsGivenUp) {
   EXPECT_NEAR(path[7].world_from_cam.translation.x(), Stamp(10) + 0.25, 1e-5);
   EXPECT_DOUBLE_EQ(path[100].timestamp_s, Stamp(200));
   EXPECT_EQ(tracked_.LiveCountOf(PartId(0)), 99u);
+  const Trajectory live = tracked_.LivePathOf(PartId(0));
+  ASSERT_EQ(live.size(), 99u);
+  EXPECT_DOUBLE_EQ(live[6].timestamp_s, Stamp(6));
+  EXPECT_DOUBLE_EQ(live[7].timestamp_s, Stamp(8)) << "the one that was found is not among them";
+  EXPECT_DOUBLE_EQ(live[98].timestamp_s, Stamp(99));
 }
 
 }  // namespace
