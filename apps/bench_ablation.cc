@@ -102,10 +102,8 @@ std::vector<Run> MakeRuns(const AblationArguments& arguments) {
                        .title = fmt::format("{}: {}, run {}", name, variant.name, number),
                        .source = source,
                        .arguments = arguments};
-        // What frames are given after their turn says nothing of tracking.
+        // Whom only the finished map finds, tracking did not.
         unit.arguments.assignments.push_back("backfill=false");
-        unit.arguments.assignments.push_back("refine_poses=false");
-        unit.arguments.assignments.push_back("smooth_path=false");
         unit.arguments.assignments.push_back(fmt::format("seed={}", number));
         if (*variant.assignment != 0) unit.arguments.assignments.push_back(variant.assignment);
         runs.push_back({std::move(unit), variant.name, number, {}, {}, {}});
