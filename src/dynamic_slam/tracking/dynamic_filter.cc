@@ -49,7 +49,7 @@ const double kMostObjectEvidence = std::log(0.95 / 0.05);
 // No class is surer than that.
 constexpr double kMostProbability = 0.99;
 
-// Bits of a word: so many objects are told apart, and all beyond them count as one.
+// Bits of a word: so many that move are told apart, and all beyond them count as the last of these.
 constexpr size_t kMaxToldApart = 32;
 
 double Sigmoid(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
@@ -218,12 +218,12 @@ double DynamicFilter::MarginOf(const Box& box) const {
 
 // A point in a box belongs to the object with object_share, else to what is behind; in several boxes to one
 // of these objects, each as likely as the other. However many overlap, motion can still overrule them.
-float DynamicFilter::PriorIn(uint32_t boxes, std::span<const Object> objects) const {
+float DynamicFilter::PriorIn(uint32_t boxes, std::span<const Object* const> objects) const {
   if (boxes == 0) return Prior(1);
   double belongs_to_none = 1, sum_moves = 0;
   for (uint32_t left = boxes; left != 0; left &= left - 1) {
     belongs_to_none *= 1 - options_.object_share;
-    sum_moves += objects[static_cast<size_t>(std::countr_zero(left))].moves;
+    sum_moves += objects[static_cast<size_t>(std::countr_zero(left))]->moves;
   }
   return Prior(1 - (1 - belongs_to_none) * sum_moves / std::popcount(boxes));
 }
@@ -231,10 +231,13 @@ float DynamicFilter::PriorIn(uint32_t boxes, std::span<const Object> objects) co
 void DynamicFilter::JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features,
                                  ByBoxes* result) const {
   result->marks.Begin(features);
-  for (size_t k = 0; k < objects.size(); ++k) {
-    if (!objects[k].IsMoving()) continue;
-    const uint32_t bit = uint32_t{1} << std::min(k, kMaxToldApart - 1);
-    result->marks.Mark(objects[k].box.box, objects[k].margin_px, outlines_px_, bit);
+  std::array<const Object*, kMaxToldApart> movers{};
+  size_t count = 0;
+  for (const Object& object : objects) {
+    if (!object.IsMoving()) continue;
+    const size_t k = std::min(count++, kMaxToldApart - 1);
+    if (movers[k] == nullptr) movers[k] = &object;
+    result->marks.Mark(object.box.box, object.margin_px, outlines_px_, uint32_t{1} << k);
   }
   // Thousands of keypoints are in a few sets of boxes.
   struct InBoxes {
@@ -252,10 +255,10 @@ void DynamicFilter::JudgeByBoxes(std::span<const Object> objects, const FeatureS
     const uint32_t boxes = result->marks.bits()[i];
     InBoxes& slot = known[boxes * 0x9e3779b1u >> (32 - kSlotBits)];  // Fibonacci hashing
     if (slot.boxes != boxes) {
-      slot = {boxes, 0, PriorIn(boxes, objects), 0};
+      slot = {boxes, 0, PriorIn(boxes, movers), 0};
       slot.unmoved = Combine(slot.prior, 0);
       for (uint32_t left = boxes; left != 0; left &= left - 1)
-        slot.in_box |= objects[static_cast<size_t>(std::countr_zero(left))].witnesses;
+        slot.in_box |= movers[static_cast<size_t>(std::countr_zero(left))]->witnesses;
     }
     result->in_box[i] = slot.in_box;
     result->prior[i] = slot.prior;

@@ -109,7 +109,7 @@ class DynamicFilter {
   double MarginOf(const Box& box) const;
   void JudgeByBoxes(std::span<const Object> objects, const FeatureSet& features, ByBoxes* result) const;
   // P(at rest) of what is in the boxes of these objects (bits).
-  float PriorIn(uint32_t boxes, std::span<const Object> objects) const;
+  float PriorIn(uint32_t boxes, std::span<const Object* const> objects) const;
   float Prior(double at_rest) const;  // within the bounds of what boxes may say
   void FindMovers(const KeypointFlow& flow);
   // rest: (place in the last frame, ideal px) -> optional<RestPlace>.

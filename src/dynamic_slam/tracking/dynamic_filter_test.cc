@@ -144,11 +144,8 @@ TEST_F(DynamicFilterTest, AKeypointIsJudgedByTheBoxesThatItIsInAlone) {
     filter.Judge(of, flow_, last_, &frame);
     return frame.static_probability;
   };
-  const DynamicBox elsewhere = [&] {
-    DynamicBox box = Person(0);
-    box.box = {-900, -900, 10, 10};
-    return box;
-  }();
+  DynamicBox elsewhere = Person(0);
+  elsewhere.box = {-900, -900, 10, 10};
   const float in_none = judge({elsewhere})[0];
   std::vector<int> in_boxes(frame_.features.size());
   for (const DynamicBox& box : boxes) {
@@ -166,6 +163,20 @@ TEST_F(DynamicFilterTest, AKeypointIsJudgedByTheBoxesThatItIsInAlone) {
   for (auto count = std::next(by_count.begin()); count != by_count.end(); ++count) {
     EXPECT_LE(count->second, std::prev(count)->second);
   }
+}
+
+TEST_F(DynamicFilterTest, ManyParkedCarsLeaveAPersonAMover) {
+  DynamicBox car = Car(900, 0);  // out of view
+  car.probability = 0.1;
+  std::vector<DynamicBox> boxes(40, car);
+  for (int k = 0; k < 40; ++k) boxes[k].track_id = 100 + k;
+  boxes.push_back(Person(kPersonPx));
+  DynamicFilter filter = Make("weights");
+  flow_.Clear(frame_);
+  filter.Judge(std::vector{Person(kPersonPx)}, flow_, last_, &frame_);
+  const std::vector<float> alone = frame_.static_probability;
+  EXPECT_GT(filter.Judge(boxes, flow_, last_, &frame_).culled, 50);
+  EXPECT_EQ(frame_.static_probability, alone);
 }
 
 TEST_F(DynamicFilterTest, ACarThatDrivesCountsAsMovingForSure) {
