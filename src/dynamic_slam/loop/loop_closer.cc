@@ -64,6 +64,14 @@ LoopResult LoopCloser::Join(Loop loop, LoopAttempt attempt, uint32_t epoch,
   return result;
 }
 
+LoopResult LoopCloser::JoinAlike(PartId here, PartId there, const std::function<bool()>& should_stop) {
+  BeginEpoch(map_->Read()->epoch());
+  LoopResult result;
+  const std::optional<Loop> loop = detector_.DetectAcross(here, there, *map_, should_stop, &result.attempts);
+  if (loop.has_value()) Close(*loop, should_stop, &result);
+  return result;
+}
+
 void LoopCloser::BeginEpoch(uint32_t epoch) {
   if (epoch == epoch_) return;
   epoch_ = epoch;

@@ -38,6 +38,9 @@ class LoopCloser {
   LoopResult Join(Loop loop, LoopAttempt attempt, uint32_t epoch,
                   const std::function<bool()>& should_stop = {});
 
+  // Joins two parts of the map where they show the same (LoopDetector::DetectAcross).
+  LoopResult JoinAlike(PartId here, PartId there, const std::function<bool()>& should_stop = {});
+
  private:
   void BeginEpoch(uint32_t epoch);
   void Close(const Loop& loop, const std::function<bool()>& should_stop, LoopResult* result);

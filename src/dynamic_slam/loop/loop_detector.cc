@@ -2,18 +2,29 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/features/matcher.h"
 #include "dynamic_slam/geometry/chi2.h"
+#include "dynamic_slam/loop/part_matches.h"
 
 namespace dynamic_slam {
 namespace {
 
 constexpr int kMatchDistance = (kStrictDistance + kLooseDistance) / 2;
 constexpr double kMatchRatio = 0.9;
+
+// Between two parts: viewpoints from which a similarity is looked for, samples drawn at most, enough when a
+// tenth of the matches is right, and viewpoints from which it is verified.
+constexpr size_t kViewpoints = 20, kVerified = 100;
+constexpr int kSamplesAcross = 5000;
+// Landmarks that must then be found by projection: beside those that are matched before, so fewer than of a
+// place that two keyframes know.
+constexpr int kMinInliersAcross = 25;
 
 // Keyframes about the candidate whose landmarks make the old place.
 constexpr size_t kPlaceKeyframes = 15;
@@ -73,6 +84,19 @@ bool IsHidden(const Keyframe& keyframe, const Eigen::Vector2d& px) {
   return 2 * movers > all;
 }
 
+LoopAttempt Attempt(const Map& map, const Keyframe& keyframe, KeyframeId candidate) {
+  LoopAttempt attempt;
+  attempt.keyframe = keyframe.id();
+  attempt.candidate = candidate;
+  attempt.timestamp_s = keyframe.timestamp_s();
+  attempt.candidate_timestamp_s = map.keyframes().At(candidate).timestamp_s();
+  return attempt;
+}
+
+LoopAttempt Attempt(const Map& map, const PartMatches::Viewpoint& viewpoint) {
+  return Attempt(map, map.keyframes().At(viewpoint.here), viewpoint.there);
+}
+
 Eigen::Vector2d Pixel(const Keypoint& keypoint) { return {keypoint.x, keypoint.y}; }
 
 }  // namespace
@@ -115,8 +139,7 @@ std::optional<Loop> LoopDetector::Detect(KeyframeId keyframe_id, uint32_t epoch,
     } else if (const Sim3Estimate estimate = EstimateSim3(camera_, candidate.matches, options_.sim3, random);
                !estimate.success) {
       attempt.sim3_inliers = estimate.inliers;
-      attempt.reason =
-          fmt::format("{} matches fit one similarity < {}", estimate.inliers, options_.sim3.min_inliers);
+      attempt.reason = TooFewFit(estimate.inliers);
     } else {
       attempt.sim3_inliers = estimate.inliers;
       const auto map = shared_map.Read();
@@ -126,13 +149,70 @@ std::optional<Loop> LoopDetector::Detect(KeyframeId keyframe_id, uint32_t epoch,
       if (keyframe == nullptr || place == nullptr) {
         attempt.reason = "the map has changed meanwhile";
       } else {
-        loop = Verify(*map, *keyframe, *place, estimate.first_from_second, &attempt);
+        loop = Verify(*map, *keyframe, *place, estimate.first_from_second,
+                      {options_.min_inliers, options_.min_found_share}, &attempt);
       }
     }
     attempts->push_back(attempt);
     if (loop.has_value() && attempt.reason.empty()) return loop;
   }
   return std::nullopt;
+}
+
+// What looks alike from one keyframe after another and fits one similarity, ten landmarks and more, is no
+// ground that looks alike everywhere: of two places that are not one, six at most did, in 300 tries. So no
+// share of the landmarks must be found, which is small where people stood in the way.
+std::optional<Loop> LoopDetector::DetectAcross(PartId here, PartId there, const SharedMap& shared_map,
+                                               const std::function<bool()>& should_stop,
+                                               std::vector<LoopAttempt>* attempts) {
+  DS_TRACE("loop/detect_across");
+  const auto map = shared_map.Read();
+  const PartMatches matches(camera_, *map, here, there);
+  const std::span<const PartMatches::Viewpoint> viewpoints = matches.viewpoints();
+  if (viewpoints.empty()) return std::nullopt;
+
+  Sim3Options options = options_.sim3;
+  options.max_ransac_iterations = std::max(options.max_ransac_iterations, kSamplesAcross);
+  Random random(seed_);
+  LoopAttempt best = Attempt(*map, viewpoints[0]);
+  Sim3 here_from_there;
+  for (const PartMatches::Viewpoint& viewpoint : viewpoints.first(std::min(kViewpoints, viewpoints.size()))) {
+    if (should_stop && should_stop()) return std::nullopt;
+    const std::vector<Sim3Match> seen = matches.From(viewpoint);
+    const Sim3Estimate estimate = EstimateSim3(camera_, seen, options, random);
+    if (estimate.inliers <= best.sim3_inliers) continue;
+    best = Attempt(*map, viewpoint);
+    best.matches = static_cast<int>(seen.size());
+    best.sim3_inliers = estimate.inliers;
+    here_from_there = ToSim3(map->keyframes().At(viewpoint.here).cam_from_world()).Inverse() *
+                      estimate.first_from_second *
+                      ToSim3(map->keyframes().At(viewpoint.there).cam_from_world());
+  }
+  if (best.sim3_inliers < options.min_inliers) {
+    best.reason = TooFewFit(best.sim3_inliers);
+    attempts->push_back(best);
+    return std::nullopt;
+  }
+
+  // Who knows the other part best need not be who sees most of it.
+  const int known = best.matches;
+  std::optional<Loop> loop;
+  for (const PartMatches::Viewpoint& viewpoint : viewpoints.first(std::min(kVerified, viewpoints.size()))) {
+    if (should_stop && should_stop()) return std::nullopt;
+    const Keyframe& keyframe = map->keyframes().At(viewpoint.here);
+    const Keyframe& candidate = map->keyframes().At(viewpoint.there);
+    const Sim3 similarity =
+        ToSim3(keyframe.cam_from_world()) * here_from_there * ToSim3(candidate.cam_from_world()).Inverse();
+    LoopAttempt attempt = Attempt(*map, viewpoint);
+    attempt.matches = known;
+    Loop verified = Verify(*map, keyframe, candidate, similarity, {kMinInliersAcross, 0}, &attempt);
+    const bool is_loop = attempt.reason.empty();
+    if (std::pair(is_loop, attempt.inliers) < std::pair(loop.has_value(), best.inliers)) continue;
+    best = attempt;
+    if (is_loop) loop = std::move(verified);
+  }
+  attempts->push_back(best);
+  return loop;
 }
 
 std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
@@ -150,10 +230,7 @@ std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
     if (keyframe.id() < place.keyframe) continue;
     if (static_cast<int>(candidates.size()) == options_.max_candidates) continue;
     Candidate candidate;
-    candidate.attempt.keyframe = keyframe.id();
-    candidate.attempt.candidate = place.keyframe;
-    candidate.attempt.timestamp_s = keyframe.timestamp_s();
-    candidate.attempt.candidate_timestamp_s = map.keyframes().At(place.keyframe).timestamp_s();
+    candidate.attempt = Attempt(map, keyframe, place.keyframe);
     candidate.attempt.score = place.score;
     candidates.push_back(candidate);
   }
@@ -165,6 +242,10 @@ std::vector<LoopDetector::Candidate> LoopDetector::Candidates(const Map& map,
     candidate.attempt.matches = static_cast<int>(candidate.matches.size());
   }
   return candidates;
+}
+
+std::string LoopDetector::TooFewFit(int inliers) const {
+  return fmt::format("{} matches fit one similarity < {}", inliers, options_.sim3.min_inliers);
 }
 
 std::vector<Sim3Match> LoopDetector::MatchLandmarks(const Map& map, const Keyframe& keyframe,
@@ -211,7 +292,7 @@ void LoopDetector::AddMatch(const Map& map, const Keyframe& keyframe, const Keyf
 }
 
 Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate,
-                          const Sim3& similarity, LoopAttempt* attempt) {
+                          const Sim3& similarity, const Needed& needed, LoopAttempt* attempt) {
   Loop loop{keyframe.id(), candidate.id(), similarity, {}, LandmarksOfPlace(map, candidate), true};
   const Sim3 candidate_from_world = ToSim3(candidate.cam_from_world());
   for (const double radius_px : {kFirstRadiusPx, kSecondRadiusPx}) {
@@ -256,15 +337,15 @@ Loop LoopDetector::Verify(const Map& map, const Keyframe& keyframe, const Keyfra
   attempt->scale = loop.keyframe_from_candidate.scale;
   attempt->drift_px = Median(drifts_px);
   loop.has_drifted = HasDrifted(keyframe, candidate, attempt->drift_px, options_);
-  if (attempt->inliers < options_.min_inliers) {
-    attempt->reason = fmt::format("{} landmarks found < {}", attempt->inliers, options_.min_inliers);
+  if (attempt->inliers < needed.inliers) {
+    attempt->reason = fmt::format("{} landmarks found < {}", attempt->inliers, needed.inliers);
     return loop;
   }
   // No image shows more landmarks than it has keypoints for them.
   attempt->visible = std::min(attempt->visible, UsableKeypoints(keyframe));
-  if (attempt->inliers < options_.min_found_share * attempt->visible) {
+  if (attempt->inliers < needed.found_share * attempt->visible) {
     attempt->reason = fmt::format("{} of {} landmarks found that should be visible < {:.0f}%",
-                                  attempt->inliers, attempt->visible, 100 * options_.min_found_share);
+                                  attempt->inliers, attempt->visible, 100 * needed.found_share);
     return loop;
   }
   if (2 * known > loop.links.size()) {

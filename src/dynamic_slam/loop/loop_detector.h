@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -65,20 +66,33 @@ class LoopDetector {
   std::optional<Loop> Detect(KeyframeId keyframe, uint32_t epoch, const SharedMap& map,
                              std::vector<LoopAttempt>* attempts);
 
+  // The same between two parts of the map, by what many of their keyframes together show that looks alike
+  // (PartMatches). What became of it is the last of *attempts: of those that failed, the one with the most
+  // matches that fit a similarity. `should_stop` may be empty.
+  std::optional<Loop> DetectAcross(PartId here, PartId there, const SharedMap& map,
+                                   const std::function<bool()>& should_stop,
+                                   std::vector<LoopAttempt>* attempts);
+
  private:
   struct Candidate {
     LoopAttempt attempt;
     std::vector<Sim3Match> matches;
   };
 
+  std::string TooFewFit(int inliers) const;
   std::vector<Candidate> Candidates(const Map& map, const Keyframe& keyframe) const;
   std::vector<Sim3Match> MatchLandmarks(const Map& map, const Keyframe& keyframe,
                                         const Keyframe& candidate) const;
   void AddMatch(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, uint32_t keypoint_index,
                 LandmarkId landmark, std::vector<Sim3Match>* matches) const;
+  // Of the landmarks of the old place.
+  struct Needed {
+    int inliers;
+    double found_share;
+  };
   // Fills in the attempt; its reason is empty when it is a loop.
   Loop Verify(const Map& map, const Keyframe& keyframe, const Keyframe& candidate, const Sim3& similarity,
-              LoopAttempt* attempt);
+              const Needed& needed, LoopAttempt* attempt);
   // What the keyframe sees of the landmarks from where it would be among them. *visible: how many of them it
   // should see.
   std::vector<Loop::Link> FindLandmarks(const Map& map, const Keyframe& keyframe,

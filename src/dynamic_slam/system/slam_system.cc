@@ -262,6 +262,7 @@ BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {
     DrainMapping();
     if (options_.loop.enabled) CloseBorders(should_stop);
     if (refiner_.has_value()) GrowOverParts(should_stop);
+    if (options_.loop.enabled) JoinAlikeParts(should_stop);
   }
   const bool adjusts = options_.final_bundle && changes_map;
   BundleSummary bundle;
@@ -313,6 +314,16 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
     attempt.drift_px = bridge.drift_px;
     attempt.reason = bridge.reason;
     FinishLoop(loop_closer_.Join(loop, attempt, epoch, should_stop), start, should_stop);
+  }
+}
+
+void SlamSystem::JoinAlikeParts(const std::function<bool()>& should_stop) {
+  for (const PartId part : tracked_.Parts()) {
+    if (should_stop && should_stop()) return;
+    const PartId main = tracked_.Parts().front();
+    if (part == main) continue;
+    const auto start = std::chrono::steady_clock::now();
+    FinishLoop(loop_closer_.JoinAlike(part, main, should_stop), start, should_stop);
   }
 }
 

@@ -97,9 +97,9 @@ class SlamSystem {
 
   // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
   // poses of frames that have none yet, joins parts of which one goes on where another ends, grows over
-  // parts that nothing joined, tracks all frames once more, cuts off what stands wrong, and smooths the path.
-  // Poses and landmarks are final after it. `should_stop` may be empty; when it says so, the adjustment ends
-  // with what it has. Does nothing after Stop().
+  // parts that nothing joined, or joins them by what they show alike, tracks all frames once more, cuts off
+  // what stands wrong, and smooths the path. Poses and landmarks are final after it. `should_stop` may be
+  // empty; when it says so, the adjustment ends with what it has. Does nothing after Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -161,6 +161,8 @@ class SlamSystem {
   // Makes one of parts of the map where frames of one follow those of another, and mends a part that has such
   // a border in itself.
   void CloseBorders(const std::function<bool()>& should_stop);
+  // Makes one of the main part and others in which keyframes show what it shows.
+  void JoinAlikeParts(const std::function<bool()>& should_stop);
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
   void GrowOverParts(const std::function<bool()>& should_stop);
   // Links keyframes to what the map has of the same things from another time; whether there are such.
