@@ -160,8 +160,8 @@ std::optional<Loop> LoopDetector::Detect(KeyframeId keyframe_id, uint32_t epoch,
 }
 
 // What looks alike from one keyframe after another and fits one similarity, ten landmarks and more, is no
-// ground that looks alike everywhere: of two places that are not one, six at most did, in 300 tries. So no
-// share of the landmarks must be found, which is small where people stood in the way.
+// ground that looks alike everywhere: of two places that are not one, four at most did, in some 160 tries. So
+// no share of the landmarks must be found, which is small where people stood in the way.
 std::optional<Loop> LoopDetector::DetectAcross(PartId here, PartId there, const SharedMap& shared_map,
                                                const std::function<bool()>& should_stop,
                                                std::vector<LoopAttempt>* attempts) {
