@@ -67,8 +67,8 @@ class LoopDetector {
                              std::vector<LoopAttempt>* attempts);
 
   // The same between two parts of the map, by what many of their keyframes together show that looks alike
-  // (PartMatches). What became of it is the last of *attempts: of those that failed, the one with the most
-  // matches that fit a similarity. `should_stop` may be empty.
+  // (PartMatches). What became of it is the last of *attempts: of those that failed, the one that came the
+  // farthest. Holds the map's lock until it is done. `should_stop` may be empty.
   std::optional<Loop> DetectAcross(PartId here, PartId there, const SharedMap& map,
                                    const std::function<bool()>& should_stop,
                                    std::vector<LoopAttempt>* attempts);

@@ -51,7 +51,8 @@ struct MappingReport {
 
 // What the search for loops has found so far.
 struct LoopReport {
-  // Of all keyframes, in their order, then of the borders of parts; a reason says why one was refused.
+  // Of all keyframes, in their order, then of the borders of parts, then of parts; a reason says why one was
+  // refused.
   std::vector<LoopAttempt> attempts;
   int linked = 0;     // places known again where nothing had to be moved
   int corrected = 0;  // loops after which the map was moved
