@@ -308,7 +308,7 @@ void SlamNode::AddServices() {
       "load_map",
       [this](const MapFile::Request& request, MapFile::Response*) {
         SavedMap saved = ReadMapFile(request.file);
-        system().CheckMapFits(saved, request.file);
+        CheckMapFits(saved, system().camera(), system().map().Read()->octave_scales(), request.file);
         Forget();
         const size_t keyframes = saved.map.keyframes().size();
         system().LoadMap(std::move(saved), request.file);

@@ -33,8 +33,14 @@ LoopResult LoopCloser::Process(KeyframeId keyframe, uint32_t epoch,
                                const std::function<bool()>& should_stop) {
   DS_TRACE("loop");
   BeginEpoch(epoch);
+  if (keyframes_since_loop_++ < options_.min_keyframes_between) return {};
+  return ProcessNow(keyframe, epoch, should_stop);
+}
+
+LoopResult LoopCloser::ProcessNow(KeyframeId keyframe, uint32_t epoch,
+                                  const std::function<bool()>& should_stop) {
+  BeginEpoch(epoch);
   LoopResult result;
-  if (keyframes_since_loop_++ < options_.min_keyframes_between) return result;
   const std::optional<Loop> loop = detector_.Detect(keyframe, epoch, *map_, &result.attempts);
   if (loop.has_value()) Close(*loop, should_stop, &result);
   return result;

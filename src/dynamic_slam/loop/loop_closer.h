@@ -32,6 +32,9 @@ class LoopCloser {
   // corrected.
   LoopResult Process(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
 
+  // The same, also where a loop was closed a few keyframes ago.
+  LoopResult ProcessNow(KeyframeId keyframe, uint32_t epoch, const std::function<bool()>& should_stop = {});
+
   // Closes a loop of whose similarity another is sure; of it, the landmarks of the place and whether it has
   // drifted are found here. The attempt says how it was found; where it has a reason, it is no loop, and
   // nothing happens.

@@ -210,6 +210,18 @@ TEST(LoopCloserTest, AfterACorrectionAFewKeyframesRest) {
   for (int i = 0; i < 2; ++i) EXPECT_THAT(closer.Process(visits.ids[1][0], epoch).attempts, IsEmpty());
 }
 
+TEST(LoopCloserTest, ThoseThatRestAreLookedAtWhereItIsAskedFor) {
+  TwoVisits visits(kDrift, 0.05, true);
+  LoopCloser closer(visits.world.camera(), {.min_keyframes_between = 2}, 1, &visits.map.shared_map);
+  const uint32_t epoch = visits.map.map.epoch();
+  const KeyframeId keyframe = visits.ids[1].back();
+  ASSERT_TRUE(closer.Process(keyframe, epoch).joined);
+  visits.map.map.SplitPart(visits.ids[1]);
+  EXPECT_THAT(closer.Process(keyframe, epoch).attempts, IsEmpty());
+  EXPECT_THAT(closer.ProcessNow(keyframe, epoch + 1).attempts, IsEmpty()) << "another map";
+  EXPECT_THAT(closer.ProcessNow(keyframe, epoch).attempts, Not(IsEmpty()));
+}
+
 TEST(LoopCloserTest, TheSameMapGivesTheSameBits) {
   TwoVisits first(kDrift), second(kDrift);
   first.Close();

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -325,6 +326,14 @@ size_t RoomFor(const Map& map) {
   return bytes;
 }
 
+// Whether keypoints are where they would be with the other one.
+bool IsSameCamera(const Camera& a, const Camera& b) {
+  const auto numbers = [](const Camera& c) {
+    return std::tuple(c.width, c.height, c.model, c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4);
+  };
+  return numbers(a) == numbers(b);
+}
+
 }  // namespace
 
 std::string WithMapHeader(std::string_view payload) { return Header(payload).append(payload); }
@@ -396,6 +405,18 @@ void WriteMapFile(const std::filesystem::path& file, const Camera& camera, const
 
 SavedMap ReadMapFile(const std::filesystem::path& file) {
   return DecodeMap(ReadFile(file, "Give a file that run --save-map wrote."), file.string());
+}
+
+void CheckMapFits(const SavedMap& saved, const Camera& camera, const std::vector<float>& octave_scales,
+                  const std::string& name) {
+  if (!IsSameCamera(saved.camera, camera)) {
+    throw InputError(name, fmt::format("was made with another camera ('{}')", saved.camera.name),
+                     "Give the --camera and the options image.* of the run that saved it.");
+  }
+  if (saved.map.octave_scales() != octave_scales) {
+    throw InputError(name, "was made with other octaves",
+                     "Give orb.levels and orb.scale_factor of the run that saved it.");
+  }
 }
 
 }  // namespace dynamic_slam

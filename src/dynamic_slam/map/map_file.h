@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/map.h"
@@ -36,5 +37,10 @@ void WriteMapFile(const std::filesystem::path& file, const Camera& camera, const
 
 // Throws InputError.
 SavedMap ReadMapFile(const std::filesystem::path& file);
+
+// Throws InputError, which begins with `name`, when the map was made with another camera or other octaves
+// than these (OctaveScales).
+void CheckMapFits(const SavedMap& saved, const Camera& camera, const std::vector<float>& octave_scales,
+                  const std::string& name);
 
 }  // namespace dynamic_slam

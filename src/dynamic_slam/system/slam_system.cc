@@ -5,7 +5,6 @@
 #include <cmath>
 #include <exception>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -31,14 +30,6 @@ constexpr int kViewRounds = 2;
 
 double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-// Whether keypoints are where they would be with the other one.
-bool IsSameCamera(const Camera& a, const Camera& b) {
-  const auto numbers = [](const Camera& c) {
-    return std::tuple(c.width, c.height, c.model, c.fx, c.fy, c.cx, c.cy, c.k1, c.k2, c.p1, c.p2, c.k3, c.k4);
-  };
-  return numbers(a) == numbers(b);
 }
 
 // Whether the part has keyframes of a map that was loaded.
@@ -317,16 +308,6 @@ void SlamSystem::CloseBorders(const std::function<bool()>& should_stop) {
   }
 }
 
-void SlamSystem::JoinAlikeParts(const std::function<bool()>& should_stop) {
-  for (const PartId part : tracked_.Parts()) {
-    if (should_stop && should_stop()) return;
-    const PartId main = tracked_.Parts().front();
-    if (part == main) continue;
-    const auto start = std::chrono::steady_clock::now();
-    FinishLoop(loop_closer_.JoinAlike(part, main, should_stop), start, should_stop);
-  }
-}
-
 void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
   for (const PartId part : tracked_.Parts()) {
     if (should_stop && should_stop()) return;
@@ -335,27 +316,74 @@ void SlamSystem::GrowOverParts(const std::function<bool()>& should_stop) {
     std::set<double> stamps;
     for (const StampedPose& pose : tracked_.PathOf(part)) stamps.insert(pose.timestamp_s);
     if (stamps.empty() || stamps.size() > kMostGrownOver) continue;
+    const auto is_shared = [&](const AnchoredPose& pose) { return stamps.contains(pose.timestamp_s); };
     // For a trial, as most of what nothing joined is elsewhere.
-    Map map = *map_.Read();
-    const MappingReport report = *mapping_report_.Read();
-    refiner_->GiveTo(&*backfiller_, stamps);
-    std::vector<AnchoredPose> known = tracked_.PosesBut(stamps), found;
+    const Map map = *map_.Read();
+    const MappingReport mapping_report = *mapping_report_.Read();
+    const LoopReport loop_report = *loop_report_.Read();
+    const auto undo = [&] {
+      map_.Write()->Replace(Map(map));
+      *mapping_report_.Write() = mapping_report;
+      *loop_report_.Write() = loop_report;
+      mapped_.Write()->clear();
+    };
     map_.Write()->ErasePart(part);
-    for (const bool grows : {true, false}) {
-      const std::vector<AnchoredPose> now = Backfill(known, grows, should_stop);
-      known.insert(known.end(), now.begin(), now.end());
-      found.insert(found.end(), now.begin(), now.end());
-    }
+    std::vector<AnchoredPose> found = GrowOver(stamps, should_stop);
     const bool is_whole = !should_stop || !should_stop();
     if (is_whole && tracked_.HasNearlyAll(main, stamps, found)) {
       tracked_.RemoveThoseOfErasedParts();
-      tracked_.AddFound(found);
-      DrainMapping();
     } else {
-      map_.Write()->Replace(std::move(map));
-      *mapping_report_.Write() = report;
-      mapped_.Write()->clear();
+      undo();
+      if (!is_whole || std::none_of(found.begin(), found.end(), is_shared)) continue;
+      backfiller_->Ignore(part);
+      found = GrowOver(stamps, should_stop);
+      backfiller_->Ignore({});
+      if (!JoinBySharedFrames(stamps, should_stop)) {
+        undo();
+        continue;
+      }
+      std::erase_if(found, is_shared);
     }
+    tracked_.AddFound(found);
+    DrainMapping();
+  }
+}
+
+std::vector<AnchoredPose> SlamSystem::GrowOver(const std::set<double>& stamps,
+                                               const std::function<bool()>& should_stop) {
+  refiner_->GiveTo(&*backfiller_, stamps);
+  std::vector<AnchoredPose> known = tracked_.PosesBut(stamps), found;
+  for (const bool grows : {true, false}) {
+    const std::vector<AnchoredPose> now = Backfill(known, grows, should_stop);
+    known.insert(known.end(), now.begin(), now.end());
+    found.insert(found.end(), now.begin(), now.end());
+  }
+  return found;
+}
+
+bool SlamSystem::JoinBySharedFrames(const std::set<double>& stamps,
+                                    const std::function<bool()>& should_stop) {
+  const std::vector<MappedKeyframe> grown = *mapped_.Read();
+  return std::any_of(grown.begin(), grown.end(), [&](const MappedKeyframe& mapped) {
+    {
+      const auto map = map_.Read();
+      const Keyframe* keyframe = map->keyframes().Find(mapped.id);
+      if (keyframe == nullptr || !stamps.contains(keyframe->timestamp_s())) return false;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const LoopResult result = loop_closer_.ProcessNow(mapped.id, mapped.epoch, should_stop);
+    FinishLoop(result, start, should_stop);
+    return result.joined;
+  });
+}
+
+void SlamSystem::JoinAlikeParts(const std::function<bool()>& should_stop) {
+  for (const PartId part : tracked_.Parts()) {
+    if (should_stop && should_stop()) return;
+    const PartId main = tracked_.Parts().front();
+    if (part == main) continue;
+    const auto start = std::chrono::steady_clock::now();
+    FinishLoop(loop_closer_.JoinAlike(part, main, should_stop), start, should_stop);
   }
 }
 
@@ -400,20 +428,9 @@ void SlamSystem::SetDetector(std::shared_ptr<Detector> detector) {
   }
 }
 
-void SlamSystem::CheckMapFits(const SavedMap& saved, const std::string& name) const {
-  if (!IsSameCamera(saved.camera, camera())) {
-    throw InputError(name, fmt::format("was made with another camera ('{}')", saved.camera.name),
-                     "Give the --camera and the options image.* of the run that saved it.");
-  }
-  if (saved.map.octave_scales() != OctaveScales(options_.orb)) {
-    throw InputError(name, "was made with other octaves",
-                     "Give orb.levels and orb.scale_factor of the run that saved it.");
-  }
-}
-
 void SlamSystem::LoadMap(SavedMap saved, const std::string& name) {
   DS_CHECK(frame_count_ == 0, "frames={}", frame_count_);
-  CheckMapFits(saved, name);
+  CheckMapFits(saved, camera(), OctaveScales(options_.orb), name);
   saved.map.landmarks().ForEach([](Landmark& landmark) {
     // Many sightings of an earlier visit say no more of this one than a few.
     constexpr int kMaxSightings = 10;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -81,10 +82,8 @@ class SlamSystem {
   // called before the first image.
   void SetDetector(std::shared_ptr<Detector> detector);
 
-  // Throws InputError when the map was made with another camera or other octaves. `name` is that of its file.
-  void CheckMapFits(const SavedMap& saved, const std::string& name) const;
-
-  // The camera is looked for in this map first. To be called before the first image. Throws as CheckMapFits.
+  // The camera is looked for in this map first. To be called before the first image. Throws as CheckMapFits
+  // does for the file `name`.
   void LoadMap(SavedMap saved, const std::string& name);
 
   // Only poses in the map, which stays as it is (true), or growth again (false), from the next image on.
@@ -162,10 +161,16 @@ class SlamSystem {
   // Makes one of parts of the map where frames of one follow those of another, and mends a part that has such
   // a border in itself.
   void CloseBorders(const std::function<bool()>& should_stop);
+  // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
+  // Where it reaches some of them, it is in the images that both have that they are joined.
+  void GrowOverParts(const std::function<bool()>& should_stop);
+  // Lets the map grow over frames of these stamps from all others; all that were found.
+  std::vector<AnchoredPose> GrowOver(const std::set<double>& stamps,
+                                     const std::function<bool()>& should_stop);
+  // By keyframes of these stamps with which the map has just grown.
+  bool JoinBySharedFrames(const std::set<double>& stamps, const std::function<bool()>& should_stop);
   // Makes one of the main part and others in which keyframes show what it shows.
   void JoinAlikeParts(const std::function<bool()>& should_stop);
-  // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
-  void GrowOverParts(const std::function<bool()>& should_stop);
   // Links keyframes to what the map has of the same things from another time; whether there are such.
   bool LinkRevisits(const std::function<bool()>& should_stop);
   // Adjusts the map to what frames see that are tracked once more in it. noises: gets how the camera was

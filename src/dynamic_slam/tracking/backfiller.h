@@ -48,6 +48,10 @@ class Backfiller {
   std::vector<AnchoredPose> Grow(std::span<const AnchoredPose> known, const MapKeyframe& map_keyframe,
                                  const std::function<bool()>& should_stop);
 
+  // Frames are not looked for in this part of the map, in which none may be known; in every part, if it is
+  // not valid.
+  void Ignore(PartId part) { finder_.localiser().Ignore(part); }
+
   void Clear();
 
  private:

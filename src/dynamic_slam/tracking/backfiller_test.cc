@@ -79,6 +79,21 @@ TEST_F(BackfillerTest, FarFromAnyPoseTwoFramesInARowAreFoundByWhatTheyLookLike) 
   }
 }
 
+TEST_F(BackfillerTest, APartThatIsIgnoredIsAsIfItWereNotThere) {
+  backfiller_.Keep(FrameAt(0.5), kMinInliers, false);
+  world_.Repaint(0);
+  const PartId other = scene_.map.BeginPart();
+  std::vector<KeyframeId> there;
+  for (const double x : {0.0, 0.5, 1.0}) there.push_back(scene_.Add(SidewaysPose(x), other));
+  scene_.AddLandmarks(0, static_cast<uint32_t>(world_.size()), there);
+  for (const double t : {100.0, 100.05})
+    backfiller_.Keep(FrameAt(t, SidewaysPose(t - 99.5)), kMinInliers, false);
+  backfiller_.Ignore(other);
+  EXPECT_EQ(backfiller_.Find(known_, {}).size(), 1u) << "in the part where poses are known";
+  backfiller_.Ignore({});
+  EXPECT_EQ(backfiller_.Find(known_, {}).size(), 3u);
+}
+
 TEST_F(BackfillerTest, FarFromAnyPoseWhatNoFrameBesideItConfirmsIsNoPose) {
   backfiller_.Keep(FrameAt(100, SidewaysPose(0.5)), kMinInliers, false);  // alone
   backfiller_.Keep(FrameAt(200, SidewaysPose(0.0)), kMinInliers, false);  // 20 units a second

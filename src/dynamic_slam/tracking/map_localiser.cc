@@ -66,8 +66,12 @@ void MapLocaliser::FindCandidates(const Frame& frame) {
   std::vector<KeyframeId> youngest;
   {
     const auto map = map_->Read();
-    for (const PlaceMatch& match : map->places().Query(words)) candidates_.push_back(match.keyframe);
-    map->keyframes().ForEach([&](const Keyframe& keyframe) { youngest.push_back(keyframe.id()); });
+    for (const PlaceMatch& match : map->places().Query(words)) {
+      if (map->PartOf(match.keyframe) != ignored_) candidates_.push_back(match.keyframe);
+    }
+    map->keyframes().ForEach([&](const Keyframe& keyframe) {
+      if (keyframe.part() != ignored_) youngest.push_back(keyframe.id());
+    });
   }
   const size_t count = static_cast<size_t>(options_.relocalisation_keyframes);
   candidates_.resize(std::min(candidates_.size(), count - count / 4));

@@ -44,6 +44,9 @@ class MapLocaliser {
   // When there is none, the frame has no landmarks any more.
   std::optional<Place> Relocalise(int min_inliers, Random& random, Frame* frame);
 
+  // Relocalise does not try keyframes of this part; of every part, if it is not valid.
+  void Ignore(PartId part) { ignored_ = part; }
+
   // Hangs the frame, at its pose, on the keyframe with which it shared most in the last call.
   void Anchor(Frame* frame) const;
 
@@ -65,6 +68,7 @@ class MapLocaliser {
   LocalView view_;
   std::vector<uint8_t> in_view_;
   std::vector<KeyframeId> candidates_;
+  PartId ignored_;
 };
 
 }  // namespace dynamic_slam
