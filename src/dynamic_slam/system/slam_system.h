@@ -162,12 +162,12 @@ class SlamSystem {
   // a border in itself.
   void CloseBorders(const std::function<bool()>& should_stop);
   // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
-  // Where it reaches some of them, it is in the images that both have that they are joined.
+  // Where it reaches some of them, the images that both have join the two.
   void GrowOverParts(const std::function<bool()>& should_stop);
-  // Lets the map grow over frames of these stamps from all others; all that were found.
+  // Lets the map grow from all other frames over those of these stamps. Returns all poses that were found.
   std::vector<AnchoredPose> GrowOver(const std::set<double>& stamps,
                                      const std::function<bool()>& should_stop);
-  // By keyframes of these stamps with which the map has just grown.
+  // By keyframes of these stamps with which the map has just grown; whether one of them did.
   bool JoinBySharedFrames(const std::set<double>& stamps, const std::function<bool()>& should_stop);
   // Makes one of the main part and others in which keyframes show what it shows.
   void JoinAlikeParts(const std::function<bool()>& should_stop);

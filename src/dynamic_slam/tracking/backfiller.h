@@ -48,8 +48,8 @@ class Backfiller {
   std::vector<AnchoredPose> Grow(std::span<const AnchoredPose> known, const MapKeyframe& map_keyframe,
                                  const std::function<bool()>& should_stop);
 
-  // Frames are not looked for in this part of the map, in which none may be known; in every part, if it is
-  // not valid.
+  // Frames are looked for in all parts of the map but this one, in which no pose may be known; in all, if it
+  // is not valid.
   void Ignore(PartId part) { finder_.localiser().Ignore(part); }
 
   void Clear();

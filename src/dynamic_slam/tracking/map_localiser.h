@@ -44,7 +44,7 @@ class MapLocaliser {
   // When there is none, the frame has no landmarks any more.
   std::optional<Place> Relocalise(int min_inliers, Random& random, Frame* frame);
 
-  // Relocalise does not try keyframes of this part; of every part, if it is not valid.
+  // Relocalise tries those of all parts but this one; of all, if it is not valid.
   void Ignore(PartId part) { ignored_ = part; }
 
   // Hangs the frame, at its pose, on the keyframe with which it shared most in the last call.
