@@ -19,6 +19,7 @@
 #include "compensated_detections.h"
 #include "detection_report.h"
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/stopwatch.h"
 #include "dynamic_slam/base/text.h"
 #include "dynamic_slam/eval/canvas.h"
 #include "dynamic_slam/io/box_file.h"
@@ -106,7 +107,7 @@ class DetectLoop {
     const FrameId id(static_cast<uint32_t>(frame));
     const Clock::time_point start = Clock::now();
     const std::vector<Detection> detections = detector_.Detect(image_, id, raw.timestamp_s);
-    run_.times_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+    run_.times_ms.push_back(MillisecondsSince(start));
     run_.stamps_s.push_back(raw.timestamp_s);
 
     std::vector<BoxRecord> detected, filled_in;

@@ -23,13 +23,6 @@ double Speed(const StampedPose& a, const StampedPose& b) {
          (b.timestamp_s - a.timestamp_s);
 }
 
-double MedianInterval_s(const Trajectory& path) {
-  std::vector<double> intervals_s;
-  for (size_t i = 1; i < path.size(); ++i)
-    intervals_s.push_back(path[i].timestamp_s - path[i - 1].timestamp_s);
-  return Percentile(0.5, &intervals_s);
-}
-
 // By the path itself.
 std::optional<double> MostSpeedOf(const Trajectory& path) {
   if (path.size() < 2) return std::nullopt;
@@ -43,6 +36,13 @@ std::optional<double> MostSpeedOf(const Trajectory& path) {
 }
 
 }  // namespace
+
+double MedianInterval_s(const Trajectory& path) {
+  std::vector<double> intervals_s;
+  for (size_t i = 1; i < path.size(); ++i)
+    intervals_s.push_back(path[i].timestamp_s - path[i - 1].timestamp_s);
+  return Percentile(0.5, &intervals_s);
+}
 
 std::optional<double> MostSpeed(std::vector<double>* speeds) {
   if (speeds->size() < kMinSteps) return std::nullopt;

@@ -12,6 +12,9 @@ namespace dynamic_slam {
 // are not even.
 inline constexpr double kMaxGapFrames = 4.5;
 
+// The median time from one pose to the next.
+double MedianInterval_s(const Trajectory& path);
+
 // How fast a camera can have been that had these speeds from pose to pose, in their unit: twice as fast as it
 // nearly always was. Of too few nobody knows. Reorders them.
 std::optional<double> MostSpeed(std::vector<double>* speeds);

@@ -50,7 +50,7 @@ MappingResult LocalMapper::Process(KeyframeId keyframe, uint32_t epoch,
                       CullMovedLandmarks(keyframe, map, &result);
                     }) &&
                     CreateLandmarks(keyframe, &result) && FuseLandmarks(keyframe, &result) && adjust() &&
-                    CullRedundantKeyframes(keyframe, &result);
+                    (!culls_keyframes_ || CullRedundantKeyframes(keyframe, &result));
   result.abandoned = !done;
   return result;
 }

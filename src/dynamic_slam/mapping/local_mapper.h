@@ -37,6 +37,9 @@ class LocalMapper {
   // that turn out to be.
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
+  // Whether Process culls redundant keyframes. To be called while it does not run.
+  void SetCullsKeyframes(bool culls) { culls_keyframes_ = culls; }
+
  private:
   // Runs look(const Map&) or change(Map*) with the map locked. False, and not run, when the map is not that
   // of the epoch any more.
@@ -73,6 +76,7 @@ class LocalMapper {
   SharedMap* map_;
   LandmarkFactory factory_;
   LandmarkFusion fusion_;
+  bool culls_keyframes_ = true;
   uint32_t epoch_ = 0;
   std::vector<LandmarkId> recent_landmarks_;  // of the epoch
 };

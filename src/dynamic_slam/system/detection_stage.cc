@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dynamic_slam/base/error.h"
+#include "dynamic_slam/base/stopwatch.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/semantics/dynamic_prior.h"
 
@@ -51,8 +52,7 @@ void DetectionStage::Submit(FrameId frame, double timestamp_s, const cv::Mat& im
     } catch (...) {
       result.failure = "the detector failed without a reason";
     }
-    shared->times_ms.Write()->push_back(
-        std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+    shared->times_ms.Write()->push_back(MillisecondsSince(start));
     shared->exchange.Write(std::move(result));
   });
 }

@@ -15,19 +15,15 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/io/image_preparer.h"
-#include "dynamic_slam/loop/loop_closer.h"
 #include "dynamic_slam/map/map_file.h"
 #include "dynamic_slam/map/shared_map.h"
-#include "dynamic_slam/mapping/bundle_terms.h"
-#include "dynamic_slam/mapping/local_mapper.h"
+#include "dynamic_slam/system/back_end.h"
 #include "dynamic_slam/system/detection_stage.h"
 #include "dynamic_slam/system/executor.h"
+#include "dynamic_slam/system/finisher.h"
 #include "dynamic_slam/system/run_mode.h"
 #include "dynamic_slam/system/system_options.h"
 #include "dynamic_slam/system/tracked_frames.h"
-#include "dynamic_slam/tracking/backfiller.h"
-#include "dynamic_slam/tracking/bridge_finder.h"
-#include "dynamic_slam/tracking/pose_refiner.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
@@ -39,29 +35,6 @@ struct FrameResult {
   FrameObjects objects;
   double tracking_ms = 0;     // from the image in memory to its pose
   int keyframes_waiting = 0;  // for local mapping, when the frame was done
-};
-
-// What local mapping has done so far.
-struct MappingReport {
-  std::vector<double> times_ms;  // of each keyframe
-  int landmarks_created = 0, landmarks_culled = 0, landmarks_merged = 0;
-  int keyframes_culled = 0;
-  int bundles_stopped = 0;      // adjustments that ended early, since keyframes were waiting
-  int keyframes_abandoned = 0;  // whose map was given up
-};
-
-// What the search for loops has found so far.
-struct LoopReport {
-  // Of all keyframes, in their order, then of the borders of parts, then of parts; a reason says why one was
-  // refused.
-  std::vector<LoopAttempt> attempts;
-  int linked = 0;     // places known again where nothing had to be moved
-  int corrected = 0;  // loops after which the map was moved
-  int joined = 0;     // of these, those that made one of two parts of the map
-  int landmarks_merged = 0;
-  int revisit_links = 0;                 // of keyframes to what the map has from another time, at the end
-  int bundles = 0, bundles_stopped = 0;  // adjustments of the whole map after that
-  std::vector<double> times_ms;          // of each keyframe, and each border, that was looked at
 };
 
 // Dynamic-SLAM. All calls come from one thread; in realtime mode the stages beside tracking have their own.
@@ -95,11 +68,9 @@ class SlamSystem {
   // changes nothing, when the image cannot be prepared.
   FrameResult Process(double timestamp_s, const cv::Mat& image, const cv::Mat& mask = {});
 
-  // To be called after the last image: waits for the stages, then adjusts the whole map and, offline, finds
-  // poses of frames that have none yet, joins parts of which one goes on where another ends, grows over
-  // parts that nothing joined, or joins them by what they show alike, tracks all frames once more, cuts off
-  // what stands wrong, and smooths the path. Poses and landmarks are final after it. `should_stop` may be
-  // empty; when it says so, the adjustment ends with what it has. Does nothing after Stop().
+  // To be called after the last image: waits for the stages, then finishes map and path (Finisher). Poses and
+  // landmarks are final after it. `should_stop` may be empty; when it says so, that ends with what it has.
+  // Does nothing after Stop().
   BundleSummary Finish(const std::function<bool()>& should_stop = {});
 
   // Drops what the stages have not begun and ends what they have: soon, but the map stays valid. No more
@@ -124,19 +95,19 @@ class SlamSystem {
 
   // Pieces of the path that stood wrong in the map: since Finish() their frames have their poses in the rest
   // of it, or are in parts of their own.
-  int PiecesCut() const { return pieces_cut_; }
+  int PiecesCut() const { return finisher_.pieces_cut(); }
 
   // Frames whose pose the finished map did not confirm, and where the camera cannot have come by those that
   // it did: they have none any more.
-  size_t FramesRefuted() const { return frames_refuted_; }
+  size_t FramesRefuted() const { return finisher_.frames_refuted(); }
 
   // None without a detector.
   std::optional<DetectionReport> detection_report() const {
     return detection_.has_value() ? std::optional(detection_->report()) : std::nullopt;
   }
   const Detector* detector() const { return detection_.has_value() ? &detection_->detector() : nullptr; }
-  MappingReport mapping_report() const { return *mapping_report_.Read(); }
-  LoopReport loop_report() const { return *loop_report_.Read(); }
+  MappingReport mapping_report() const { return back_end_.mapping_report(); }
+  LoopReport loop_report() const { return back_end_.loop_report(); }
   RunMode mode() const { return mode_; }
   const Frame& frame() const { return tracker_.frame(); }  // of the last Process
   const SharedMap& map() const { return map_; }
@@ -145,68 +116,21 @@ class SlamSystem {
   const SystemOptions& options() const { return options_; }
 
  private:
-  struct MappedKeyframe {
-    KeyframeId id;
-    uint32_t epoch;  // of the map
-  };
-
   PartId OrMain(PartId part) const;
   FrameResult ProcessPrepared(double timestamp_s, const cv::Mat& image, const cv::Mat& mask,
                               std::chrono::steady_clock::time_point start);
   void ThrowIfFailed() const;
   void Remember(const FrameResult& result);
-  // Looks for poses of frames that have none, those that are not known; grows: and lets the map grow by them.
-  std::vector<AnchoredPose> Backfill(std::span<const AnchoredPose> known, bool grows,
-                                     const std::function<bool()>& should_stop);
-  // Makes one of parts of the map where frames of one follow those of another, and mends a part that has such
-  // a border in itself.
-  void CloseBorders(const std::function<bool()>& should_stop);
-  // Where the main part can grow over nearly all frames of another one that nothing joined, that is given up.
-  // Where it reaches some of them, the images that both have join the two.
-  void GrowOverParts(const std::function<bool()>& should_stop);
-  // Lets the map grow from all other frames over those of these stamps. Returns all poses that were found.
-  std::vector<AnchoredPose> GrowOver(const std::set<double>& stamps,
-                                     const std::function<bool()>& should_stop);
-  // By keyframes of these stamps with which the map has just grown; whether one of them did.
-  bool JoinBySharedFrames(const std::set<double>& stamps, const std::function<bool()>& should_stop);
-  // Makes one of the main part and others in which keyframes show what it shows.
-  void JoinAlikeParts(const std::function<bool()>& should_stop);
-  // Links keyframes to what the map has of the same things from another time; whether there are such.
-  bool LinkRevisits(const std::function<bool()>& should_stop);
-  // Adjusts the map to what frames see that are tracked once more in it. noises: gets how the camera was
-  // moved, where that is known.
-  void RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises);
-  // Tracks frames once more in the finished map. Poses that it refutes are given up; the path of the others
-  // becomes what is most probable.
-  void RefinePath(const MotionNoises& noises, const std::function<bool()>& should_stop);
-  bool Smooths() const { return options_.smooth_path && mode_ == RunMode::kOffline; }
-  void PostMapping(KeyframeId keyframe, uint32_t epoch);
-  void MapKeyframe(KeyframeId keyframe, uint32_t epoch, const std::stop_token& token);
-  void DrainMapping();  // and the search for loops
-  // Looks for loops at the keyframes that local mapping has done since the last call.
-  void PostLoops();
-  void CloseLoop(const MappedKeyframe& keyframe, const std::stop_token& token);
-  // Adjusts the map where it was moved, and reports.
-  void FinishLoop(const LoopResult& result, std::chrono::steady_clock::time_point start,
-                  const std::function<bool()>& should_stop);
 
   SystemOptions options_;
   ImagePreparer preparer_;
   RunMode mode_;
   SharedMap map_;
   Tracker tracker_;
-  LocalMapper mapper_;
-  LoopCloser loop_closer_;
-  Guarded<MappingReport> mapping_report_;
-  Guarded<LoopReport> loop_report_;
-  Guarded<std::vector<MappedKeyframe>> mapped_;  // and not looked at for loops yet
+  BackEnd back_end_;
   std::optional<DetectionStage> detection_;
   TrackedFrames tracked_;
-  int pieces_cut_ = 0;
-  size_t frames_refuted_ = 0;
-  std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
-  std::optional<PoseRefiner> refiner_;    // offline, unless it is turned off
-  BridgeFinder bridge_finder_;
+  Finisher finisher_;
   uint32_t frame_count_ = 0;
   cv::Mat grey_;                // the image in work
   cv::Mat colour_;              // that of the last question to the detector; free once that is answered

@@ -18,6 +18,7 @@ struct SystemOptions {
   bool final_bundle = true;
   bool backfill = true;
   bool backfill_grows_map = true;
+  bool grow_twice = true;
   bool refine_poses = true;
   bool smooth_path = true;
   ImageOptions image;
@@ -43,6 +44,10 @@ struct SystemOptions {
           OptionField{"", 0, 1,
                       "Before the map is finished it grows by such frames, where they show what it does not "
                       "have."});
+    visit("grow_twice", self.grow_twice,
+          OptionField{"", 0, 1,
+                      "Where it grows, all is finished twice, with redundant keyframes culled and kept, and "
+                      "the steadier path stays."});
     visit("refine_poses", self.refine_poses,
           OptionField{"", 0, 1,
                       "Offline: frames are tracked once more in the finished map, which knows more than when "

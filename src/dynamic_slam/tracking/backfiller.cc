@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <set>
 
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/base/trace.h"
@@ -40,11 +39,17 @@ void Backfiller::Keep(const Frame& frame, int min_inliers, bool has_pose) {
   }
 }
 
-void Backfiller::ForgetPosed() {
-  std::erase_if(kept_, [this](const KeptFrame& kept) {
-    if (kept.has_pose) keypoints_ -= kept.features.size();
-    return kept.has_pose;
+template <class Predicate>
+void Backfiller::Forget(Predicate&& is_forgotten) {
+  std::erase_if(kept_, [&](const KeptFrame& kept) {
+    const bool is_it = is_forgotten(kept);
+    if (is_it) keypoints_ -= kept.features.size();
+    return is_it;
   });
+}
+
+void Backfiller::ForgetPosed() {
+  Forget([](const KeptFrame& kept) { return kept.has_pose; });
 }
 
 void Backfiller::PartWasErased() {
@@ -74,22 +79,35 @@ std::vector<AnchoredPose> Backfiller::Find(std::span<const AnchoredPose> known,
   return found;
 }
 
+bool Backfiller::PlanGrowth(std::span<const AnchoredPose> known, const std::function<bool()>& should_stop) {
+  return LeaveOut(known, Find(known, should_stop));
+}
+
 std::vector<AnchoredPose> Backfiller::Grow(std::span<const AnchoredPose> known,
                                            const MapKeyframe& map_keyframe,
                                            const std::function<bool()>& should_stop) {
-  LeaveOut(known, Find(known, should_stop));
   map_keyframe_ = map_keyframe;
   chain_ = {};
   std::vector<AnchoredPose> found = Find(known, should_stop);
   map_keyframe_ = nullptr;
-  for (KeptFrame& kept : kept_) kept.is_left_out = false;
   return found;
 }
 
-void Backfiller::LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found) {
+std::set<double> Backfiller::Stamps() const {
+  std::set<double> stamps;
+  for (const KeptFrame& kept : kept_) stamps.insert(kept.timestamp_s);
+  return stamps;
+}
+
+void Backfiller::KeepOnly(const std::set<double>& stamps) {
+  Forget([&stamps](const KeptFrame& kept) { return !stamps.contains(kept.timestamp_s); });
+}
+
+bool Backfiller::LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found) {
   std::set<double> stamps;
   for (const AnchoredPose& pose : known) stamps.insert(pose.timestamp_s);
   for (const AnchoredPose& pose : found) stamps.insert(pose.timestamp_s);
+  bool is_any_left = false;
   for (size_t first = 0, last = 0; first < kept_.size(); first = last) {
     int missing = 0, most_missing = 0;
     for (last = first; last < kept_.size(); ++last) {
@@ -98,7 +116,9 @@ void Backfiller::LeaveOut(std::span<const AnchoredPose> known, const std::vector
       most_missing = std::max(most_missing, missing);
     }
     for (size_t i = first; i < last; ++i) kept_[i].is_left_out = most_missing <= kMostBridged;
+    is_any_left |= most_missing > kMostBridged;
   }
+  return is_any_left;
 }
 
 bool Backfiller::Spread(const std::function<bool()>& should_stop, KnownPoses* known,
@@ -108,7 +128,7 @@ bool Backfiller::Spread(const std::function<bool()>& should_stop, KnownPoses* kn
     if (is_forward) goes_on = false;
     for (size_t i = 0; i < kept_.size(); ++i) {
       KeptFrame& kept = kept_[is_forward ? i : kept_.size() - 1 - i];
-      if (kept.is_left_out || known->Contains(kept.timestamp_s)) continue;
+      if (IsLeftOut(kept) || known->Contains(kept.timestamp_s)) continue;
       if (should_stop && should_stop()) return false;
       const std::optional<AnchoredPose> pose = FindFromNeighbours(*known, &kept);
       if (!pose.has_value()) continue;
@@ -127,7 +147,7 @@ bool Backfiller::Recognise(const std::function<bool()>& should_stop, KnownPoses*
   KnownPoses with_recognised = *known;
   bool goes_on = true;
   for (const KeptFrame& kept : kept_) {
-    if (kept.is_left_out || known->Contains(kept.timestamp_s)) continue;
+    if (IsLeftOut(kept) || known->Contains(kept.timestamp_s)) continue;
     goes_on = !should_stop || !should_stop();
     if (!goes_on) break;
     Frame frame = FrameOf(kept);

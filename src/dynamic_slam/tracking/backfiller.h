@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -41,9 +42,11 @@ class Backfiller {
   std::vector<AnchoredPose> Find(std::span<const AnchoredPose> known,
                                  const std::function<bool()>& should_stop);
 
-  // The same for frames that are in a row with many that Find does not find: those of them become keyframes
-  // that would have done so in tracking. map_keyframe: what local mapping does with one that is in the map,
-  // its landmarks linked.
+  // Whether there are frames in a row with many that Find does not find. Grow is about those.
+  bool PlanGrowth(std::span<const AnchoredPose> known, const std::function<bool()>& should_stop);
+
+  // The same as Find for frames of the last plan: those of them become keyframes that would have done so in
+  // tracking. map_keyframe: what local mapping does with one that is in the map, its landmarks linked.
   using MapKeyframe = std::function<void(KeyframeId)>;
   std::vector<AnchoredPose> Grow(std::span<const AnchoredPose> known, const MapKeyframe& map_keyframe,
                                  const std::function<bool()>& should_stop);
@@ -51,6 +54,11 @@ class Backfiller {
   // Frames are looked for in all parts of the map but this one, in which no pose may be known; in all, if it
   // is not valid.
   void Ignore(PartId part) { finder_.localiser().Ignore(part); }
+
+  // Of the frames that are kept.
+  std::set<double> Stamps() const;
+  // Others are forgotten.
+  void KeepOnly(const std::set<double>& stamps);
 
   void Clear();
 
@@ -63,7 +71,7 @@ class Backfiller {
     int min_inliers = 0;
     bool has_pose = false;
     std::optional<std::pair<double, double>> tried_between;  // stamps of the poses before and after it, s
-    bool is_left_out = false;                                // for now
+    bool is_left_out = false;                                // when the map grows
   };
   // Frames in a row, forwards or backwards, by which the map grows: numbers of frames, and the most inliers
   // from the keyframe on.
@@ -81,8 +89,11 @@ class Backfiller {
                  std::vector<AnchoredPose>* found);
   std::optional<AnchoredPose> FindFromNeighbours(const KnownPoses& known, KeptFrame* kept);
   // Frames in a row of which no more are missing in these than are bridged anyhow: the map has what they
-  // show.
-  void LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found);
+  // show. Whether others are left.
+  bool LeaveOut(std::span<const AnchoredPose> known, const std::vector<AnchoredPose>& found);
+  bool IsLeftOut(const KeptFrame& kept) const { return map_keyframe_ && kept.is_left_out; }
+  template <class Predicate>
+  void Forget(Predicate&& is_forgotten);
   Frame FrameOf(const KeptFrame& kept);
   // Makes the frame a keyframe where that is due; its pose hangs on that then.
   void GrowBy(const Frame& frame, int inliers, AnchoredPose* pose);

@@ -11,6 +11,7 @@
 namespace dynamic_slam {
 namespace {
 
+using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 
@@ -176,6 +177,7 @@ class GrowingBackfillerTest : public BackfillerTest {
 TEST_F(GrowingBackfillerTest, TheMapGrowsAgainstTheOrderOfTime) {
   keyframes_ = {keyframes_[0]};
   const size_t without = backfiller_.Find(known_, {}).size();
+  ASSERT_TRUE(backfiller_.PlanGrowth(known_, {}));
   const std::vector<AnchoredPose> found = backfiller_.Grow(known_, [this](KeyframeId id) { Map(id); }, {});
   EXPECT_LT(without, size_t{kFrames - 10});
   EXPECT_EQ(found.size(), size_t{kFrames});
@@ -190,6 +192,7 @@ TEST_F(GrowingBackfillerTest, TheMapGrowsAgainstTheOrderOfTime) {
 TEST_F(BackfillerTest, WhatTheMapHasDoesNotGrowIt) {
   for (const double t : {0.4, 0.45, 0.5, 0.55, 0.6}) backfiller_.Keep(FrameAt(t), kMinInliers, false);
   int mapped = 0;
+  EXPECT_FALSE(backfiller_.PlanGrowth(known_, {}));
   EXPECT_THAT(backfiller_.Grow(known_, [&mapped](KeyframeId) { ++mapped; }, {}), IsEmpty());
   EXPECT_EQ(mapped, 0);
   EXPECT_EQ(scene_.map.keyframes().size(), 3u);
@@ -209,6 +212,14 @@ TEST_F(BackfillerTest, FramesOfAnErasedPartAreFoundAndOthersAreNotLookedFor) {
   const std::vector<AnchoredPose> found = backfiller_.Find(known_, {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].timestamp_s, 0.4);
+}
+
+TEST_F(BackfillerTest, FramesThatAreNotToBeKeptAreNotLookedFor) {
+  for (const double t : {0.4, 0.45, 0.5}) backfiller_.Keep(FrameAt(t), kMinInliers, false);
+  EXPECT_THAT(backfiller_.Stamps(), ElementsAre(0.4, 0.45, 0.5));
+  backfiller_.KeepOnly({0.4, 0.5, 0.7});
+  EXPECT_THAT(backfiller_.Stamps(), ElementsAre(0.4, 0.5));
+  EXPECT_EQ(backfiller_.Find(known_, {}).size(), 2u);
 }
 
 TEST_F(BackfillerTest, OnlyTheLastPoseIsWithdrawn) {
