@@ -72,6 +72,7 @@ void Finisher::Remember(const Frame& frame, const TrackingResult& tracking) {
 void Finisher::Clear() {
   if (backfiller_.has_value()) backfiller_->Clear();
   if (refiner_.has_value()) refiner_->Clear();
+  back_end_->mapper().SetCullsKeyframes(true);  // in case Finish threw
   pieces_cut_ = 0;
   frames_refuted_ = 0;
 }
