@@ -34,10 +34,12 @@ bool IsFromFile(const Map& map, PartId part) {
 
 // Of two paths of the same frames: whether one has more of them, and is not rougher by as much.
 bool IsBetter(const Trajectory& path, const Trajectory& than) {
+  // What lacks a few frames must be clearly the steadier: where the map no longer grew it had gone astray.
+  constexpr double kWeightOfFrames = 6;
   const auto [roughness, other_roughness] = RoughnessWhereTheyDiffer(path, than);
   const double frames = static_cast<double>(path.size()), others = static_cast<double>(than.size());
   if (!(roughness > 0 && other_roughness > 0)) return frames > others;
-  return frames / roughness > others / other_roughness;
+  return std::pow(frames / others, kWeightOfFrames) > roughness / other_roughness;
 }
 
 }  // namespace
