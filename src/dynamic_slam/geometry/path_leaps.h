@@ -12,6 +12,9 @@ namespace dynamic_slam {
 // are not even.
 inline constexpr double kMaxGapFrames = 4.5;
 
+// Frames in a row are no farther apart, in intervals.
+inline constexpr double kNextFrame = 1.5;
+
 // The median time from one pose to the next.
 double MedianInterval_s(const Trajectory& path);
 

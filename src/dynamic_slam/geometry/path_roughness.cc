@@ -12,9 +12,6 @@
 namespace dynamic_slam {
 namespace {
 
-// Frames that follow each other are no farther apart, in intervals.
-constexpr double kNextFrame = 1.5;
-
 // Of which each lays the nearer half better on each other (Rousseeuw and Van Driessen 1999, C-steps).
 constexpr int kAlignments = 20;
 

@@ -11,12 +11,11 @@ namespace {
 constexpr int kPoses = 300;
 
 // A camera that goes round once in ten seconds, 30 frames a second.
-Trajectory Round(double radius = 1) {
+Trajectory Round() {
   Trajectory path;
   for (int i = 0; i < kPoses; ++i) {
     const double angle = 2 * std::numbers::pi * i / kPoses;
-    path.push_back({i / 30.0, Rigid3(Eigen::Quaterniond::Identity(),
-                                     {radius * std::cos(angle), radius * std::sin(angle), 0})});
+    path.push_back({i / 30.0, Rigid3(Eigen::Quaterniond::Identity(), {std::cos(angle), std::sin(angle), 0})});
   }
   return path;
 }

@@ -6,6 +6,7 @@
 
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/base/trace.h"
+#include "dynamic_slam/geometry/path_leaps.h"
 #include "dynamic_slam/tracking/keyframe_policy.h"
 
 namespace dynamic_slam {
@@ -15,9 +16,6 @@ constexpr size_t kMaxKeypoints = 2'000'000;
 
 // So many frames in a row are bridged from the poses beside them.
 constexpr int kMostBridged = 4;
-
-// Frames in a row are no farther apart, in intervals.
-constexpr double kNextFrame = 1.5;
 
 }  // namespace
 
