@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
-#include <set>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
