@@ -9,8 +9,8 @@
 #include "dynamic_slam/base/error.h"
 #include "dynamic_slam/base/trace.h"
 #include "dynamic_slam/features/corner_selection.h"
-#include "dynamic_slam/features/downscaler.h"
 #include "dynamic_slam/features/fast_detector.h"
+#include "dynamic_slam/features/image_pyramid.h"
 #include "dynamic_slam/features/smoothing.h"
 #include "dynamic_slam/features/steered_brief.h"
 #include "dynamic_slam/features/undistortion_table.h"
@@ -40,22 +40,13 @@ class OrbExtractor::Impl {
         undistortion_(camera),
         crew_("orb", threads),
         desks_(crew_.size()),
-        levels_(options.levels) {
+        pyramid_({camera.width, camera.height}, options.levels, options.scale_factor),
+        levels_(pyramid_.size()) {
     for (Desk& desk : desks_) desk.blurred = cv::Mat::zeros(camera.height, Stride(camera.width), CV_8UC1);
-    DS_CHECK(options.levels >= 1 && options.scale_factor > 1, "levels={} scale_factor={}", options.levels,
-             options.scale_factor);
     double scale = 1;
-    for (Level& level : levels_) {
-      const int width = std::max(1, cvRound(width_ / scale)), height = std::max(1, cvRound(height_ / scale));
-      level.image.create(height, width, CV_8UC1);
-      level.smoothed.create(height, width, CV_8UC1);
-      level.scale_x = static_cast<float>(width_) / static_cast<float>(width);
-      level.scale_y = static_cast<float>(height_) / static_cast<float>(height);
+    for (size_t i = 0; i < levels_.size(); ++i, scale *= options.scale_factor) {
+      levels_[i].smoothed.create(pyramid_.SizeOf(i), CV_8UC1);
       weights_.push_back(1 / scale);
-      scale *= options.scale_factor;
-    }
-    for (size_t i = 1; i < levels_.size(); ++i) {
-      downscalers_.emplace_back(levels_[i - 1].image.size(), levels_[i].image.size());
     }
     available_.resize(levels_.size());
     MaskBlindPixels(camera);
@@ -66,18 +57,16 @@ class OrbExtractor::Impl {
              "type={} {}x{}, not {}x{}", grey.type(), grey.cols, grey.rows, width_, height_);
     DS_CHECK(mask.empty() || (mask.type() == CV_8UC1 && mask.size() == grey.size()), "type={} {}x{}",
              mask.type(), mask.cols, mask.rows);
-    levels_[0].image = grey;  // shares the pixels
-    for (size_t i = 1; i < levels_.size(); ++i)
-      downscalers_[i - 1].Run(levels_[i - 1].image, &levels_[i].image);
+    pyramid_.Build(grey);
     crew_.ForEach(levels_.size(), [&](size_t i, size_t member) {
       Level& level = levels_[i];
       Desk& desk = desks_[member];
       level.corners.clear();
       // Not in the paper: on a slightly smoothed image FAST finds more of the same corners again, by a tenth.
-      Smooth(level.image, &level.smoothed, &desk.row);
+      Smooth(pyramid_[i].image, &level.smoothed, &desk.row);
       desk.fast.Detect(level.smoothed, SteeredBrief::kBorder, options_.fast_threshold_min, &level.corners);
-      if (!mask.empty()) DropMasked(mask, &level);
-      if (!blind_.empty()) DropMasked(blind_, &level);
+      if (!mask.empty()) DropMasked(mask, pyramid_[i], &level);
+      if (!blind_.empty()) DropMasked(blind_, pyramid_[i], &level);
       available_[i] = static_cast<int>(level.corners.size());
     });
     ShareOverLevels(options_.features, weights_, available_, &wanted_);
@@ -91,11 +80,12 @@ class OrbExtractor::Impl {
     crew_.ForEach(levels_.size(), [&](size_t i, size_t member) {
       Level& level = levels_[i];
       Desk& desk = desks_[member];
-      desk.selector.Select(level.image.cols, level.image.rows, wanted_[i], options_.fast_threshold,
-                           RoundsLate(level, &desk.rounds_late), &level.corners);
-      if (!level.corners.empty()) Describe(level, static_cast<int>(i), &desk, features);
+      const cv::Size size = pyramid_.SizeOf(i);
+      desk.selector.Select(size.width, size.height, wanted_[i], options_.fast_threshold,
+                           RoundsLate(pyramid_[i], level, &desk.rounds_late), &level.corners);
+      if (!level.corners.empty()) Describe(pyramid_[i], level, static_cast<int>(i), &desk, features);
     });
-    levels_[0].image = cv::Mat();  // the caller's pixels are not ours to keep
+    pyramid_.ReleaseImage();  // the caller's pixels are not ours to keep
   }
 
   void SetFeatures(int features) {
@@ -122,15 +112,9 @@ class OrbExtractor::Impl {
 
  private:
   struct Level {
-    cv::Mat image;     // CV_8UC1
     cv::Mat smoothed;  // for the corners
-    float scale_x, scale_y;  // full-resolution px per px; the two differ as sizes are whole numbers
     std::vector<Corner> corners;
     size_t begin = 0;  // of its features among those of all levels
-
-    // Pixel centres are at whole numbers, so the image's corner is at -0.5 at every level.
-    float FullX(float x) const { return (x + 0.5f) * scale_x - 0.5f; }
-    float FullY(float y) const { return (y + 0.5f) * scale_y - 0.5f; }
   };
 
   // What a thread needs to look at one level after the other.
@@ -153,32 +137,34 @@ class OrbExtractor::Impl {
     if (cv::countNonZero(blind) > 0) blind_ = blind;
   }
 
-  static void DropMasked(const cv::Mat& mask, Level* level) {
+  static void DropMasked(const cv::Mat& mask, const ImagePyramid::Level& image, Level* level) {
     std::erase_if(level->corners, [&](const Corner& corner) {
-      return mask.at<uint8_t>(cvRound(level->FullY(corner.y)), cvRound(level->FullX(corner.x))) != 0;
+      return mask.at<uint8_t>(cvRound(image.FullY(corner.y)), cvRound(image.FullX(corner.x))) != 0;
     });
   }
 
-  std::span<const uint8_t> RoundsLate(const Level& level, std::vector<uint8_t>* rounds_late) const {
+  std::span<const uint8_t> RoundsLate(const ImagePyramid::Level& image, const Level& level,
+                                      std::vector<uint8_t>* rounds_late) const {
     rounds_late->clear();
     if (!has_deferred_) return {};
     for (const Corner& corner : level.corners) {
-      rounds_late->push_back(deferred_.at<uint8_t>(cvRound(level.FullY(corner.y)) / kDeferredCell_px,
-                                                   cvRound(level.FullX(corner.x)) / kDeferredCell_px));
+      rounds_late->push_back(deferred_.at<uint8_t>(cvRound(image.FullY(corner.y)) / kDeferredCell_px,
+                                                   cvRound(image.FullX(corner.x)) / kDeferredCell_px));
     }
     return *rounds_late;
   }
 
-  void Describe(const Level& level, int octave, Desk* desk, FeatureSet* features) const {
-    cv::Mat blurred = desk->blurred(cv::Rect({}, level.image.size()));
+  void Describe(const ImagePyramid::Level& image, const Level& level, int octave, Desk* desk,
+                FeatureSet* features) const {
+    cv::Mat blurred = desk->blurred(cv::Rect({}, image.image.size()));
     SmoothMore(level.smoothed, &blurred, &desk->row);
     size_t i = level.begin;
     for (const Corner& corner : level.corners) {
       Keypoint& keypoint = features->keypoints[i];
-      keypoint.raw_x = keypoint.x = level.FullX(corner.x + corner.dx);
-      keypoint.raw_y = keypoint.y = level.FullY(corner.y + corner.dy);
+      keypoint.raw_x = keypoint.x = image.FullX(corner.x + corner.dx);
+      keypoint.raw_y = keypoint.y = image.FullY(corner.y + corner.dy);
       undistortion_.Undistort(&keypoint.x, &keypoint.y);
-      keypoint.angle_rad = SteeredBrief::Angle(level.image, corner.x, corner.y);
+      keypoint.angle_rad = SteeredBrief::Angle(image.image, corner.x, corner.y);
       keypoint.response = corner.score;
       keypoint.octave = octave;
       features->descriptors[i++] =
@@ -195,9 +181,9 @@ class OrbExtractor::Impl {
   cv::Mat deferred_;  // CV_8UC1, rounds by which corners of each cell come late
   Crew crew_;
   std::vector<Desk> desks_;  // one for each of the crew
+  ImagePyramid pyramid_;
   std::vector<Level> levels_;
   std::vector<double> weights_;          // share of the features: 1 / scale
-  std::vector<Downscaler> downscalers_;  // to each level but the finest
   std::vector<int> available_, wanted_;  // corners of each level
 };
 

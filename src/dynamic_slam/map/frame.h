@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include <Eigen/Core>
@@ -71,12 +72,21 @@ struct FrameView {
     Eigen::Vector2f ideal_px;
     int32_t octave = 0;
     float static_probability = 1;
+    Eigen::Vector2f raw_px = Eigen::Vector2f::Zero();  // where the image shows it
+    float sigma_px = 0;  // standard deviation of ideal_px; 0: the scale of its octave
   };
   double timestamp_s = 0;
   PartId part;  // of the map
   Rigid3 cam_from_world;
   std::vector<Sighting> sightings;
 };
+
+// Where a keyframe sees a landmark, more exactly than its keypoint says.
+struct AlignedKeypoint {
+  Eigen::Vector2f ideal_px = Eigen::Vector2f::Zero();
+  float sigma_px = 0;  // 0: nobody knows
+};
+using AlignedKeypoints = std::map<KeyframeId, std::vector<AlignedKeypoint>>;  // of each keypoint
 
 class Keyframe;
 class Map;

@@ -39,8 +39,9 @@ Trajectory Unrolled(std::span<const StampedPose> shot) {
 BundleProblem::Observation ObservationOf(const FrameView::Sighting& sighting, const Landmark& landmark,
                                          std::span<const float> octave_scales, uint32_t pose,
                                          uint32_t point) {
-  return {pose, point, sighting.ideal_px.cast<double>(),
-          1.0 / octave_scales[static_cast<size_t>(sighting.octave)],
+  const float sigma_px =
+      sighting.sigma_px > 0 ? sighting.sigma_px : octave_scales[static_cast<size_t>(sighting.octave)];
+  return {pose, point, sighting.ideal_px.cast<double>(), 1.0 / sigma_px,
           TrustInMatch(sighting.static_probability, landmark.static_log_odds)};
 }
 

@@ -45,8 +45,8 @@ class MapBundle {
   }
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
-  // After all poses and landmarks: what the ones see of the others.
-  void AddObservations(const Map& map) {
+  // After all poses and landmarks: what the ones see of the others. aligned: may be null.
+  void AddObservations(const Map& map, const AlignedKeypoints* aligned = nullptr) {
     for (const LandmarkId id : landmarks_) {
       const Landmark& landmark = map.landmarks().At(id);
       problem_.points.push_back({landmark.position(), false});
@@ -54,11 +54,10 @@ class MapBundle {
         if (!HasPose(observation.keyframe)) continue;
         const Keyframe& keyframe = map.keyframes().At(observation.keyframe);
         const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
-        Observe(map, landmark, pose_of_[observation.keyframe.value()],
-                {id,
-                 {keypoint.x, keypoint.y},
-                 keypoint.octave,
-                 keyframe.StaticProbability(observation.keypoint)});
+        FrameView::Sighting sighting{
+            id, {keypoint.x, keypoint.y}, keypoint.octave, keyframe.StaticProbability(observation.keypoint)};
+        if (aligned != nullptr) Sharpen(*aligned, observation, &sighting);
+        Observe(map, landmark, pose_of_[observation.keyframe.value()], sighting);
         links_.push_back({observation, id});
       }
     }
@@ -143,6 +142,16 @@ class MapBundle {
     }
     if (best != nullptr) problem_.points[point_of_[best->id().value()]].fixed = true;
     return best != nullptr;
+  }
+
+  static void Sharpen(const AlignedKeypoints& aligned, const Observation& observation,
+                      FrameView::Sighting* sighting) {
+    const auto of_keyframe = aligned.find(observation.keyframe);
+    if (of_keyframe == aligned.end()) return;
+    const AlignedKeypoint& keypoint = of_keyframe->second[observation.keypoint];
+    if (!(keypoint.sigma_px > 0)) return;
+    sighting->ideal_px = keypoint.ideal_px;
+    sighting->sigma_px = keypoint.sigma_px;
   }
 
   void AddToPath(PartId part, double timestamp_s, uint32_t pose) { paths_[part].emplace(timestamp_s, pose); }
@@ -273,14 +282,14 @@ MapBundle LocalBundle(const MapperOptions& options, KeyframeId id, const Map& ma
   return bundle;
 }
 
-MapBundle WholeBundle(const Map& map) {
+MapBundle WholeBundle(const Map& map, const AlignedKeypoints* aligned) {
   MapBundle bundle(map);
   bundle.SetWhole();
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
     bundle.AddPose(map, keyframe.id(), map.IsOrigin(keyframe.id()));
     bundle.AddLandmarksOf(map, keyframe.id());
   });
-  bundle.AddObservations(map);
+  bundle.AddObservations(map, aligned);
   return bundle;
 }
 
@@ -312,7 +321,7 @@ BundleSummary AdjustAll(const Camera& camera, const MapperOptions& options,
   {
     const auto locked = map->Read();
     if (locked->keyframes().size() < 2) return {};
-    bundle = WholeBundle(*locked);
+    bundle = WholeBundle(*locked, path != nullptr ? &path->aligned : nullptr);
     if (path != nullptr) {
       bundle->AddViews(*locked, path->views);
       if (options.motion_prior) bundle->AddMotions(*locked, path->noise);

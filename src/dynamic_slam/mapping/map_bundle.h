@@ -25,6 +25,7 @@ BundleSummary AdjustLocal(const Camera& camera, const MapperOptions& options, Ke
 struct PathEvidence {
   std::span<const FrameView> views;  // frames between keyframes
   MotionNoises* noise;               // measured where it is not there yet: later, the path knows of it
+  AlignedKeypoints aligned = {};     // of keyframes
 };
 
 // The same of the whole map, the origin of each part fixed. With `path` its frames help to tell where the map

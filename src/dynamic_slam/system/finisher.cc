@@ -56,11 +56,13 @@ Finisher::Finisher(const Camera& camera, const SystemOptions& options, RunMode m
   if (mode_ != RunMode::kOffline) return;
   if (options_.backfill) backfiller_.emplace(camera_, options_.tracker, options_.seed, map_);
   if (options_.refine_poses) refiner_.emplace(camera_, options_.tracker, map_);
+  if (options_.refine_poses && options_.align_sightings) aligner_.emplace(camera_, map_);
 }
 
-void Finisher::Remember(const Frame& frame, const TrackingResult& tracking) {
+void Finisher::Remember(const Frame& frame, const TrackingResult& tracking, const cv::Mat& grey) {
   const bool has_pose = tracking.state == TrackingState::kTracking;
   if (refiner_.has_value() && ChangesMap()) refiner_->Keep(frame, tracking.min_inliers);
+  if (aligner_.has_value() && ChangesMap()) aligner_->Keep(frame.timestamp_s, grey);
   if (!backfiller_.has_value()) return;
   if (tracking.last_was_withdrawn) backfiller_->LastWasWithdrawn();
   if (tracking.part_was_erased) backfiller_->PartWasErased();
@@ -74,6 +76,7 @@ void Finisher::Remember(const Frame& frame, const TrackingResult& tracking) {
 void Finisher::Clear() {
   if (backfiller_.has_value()) backfiller_->Clear();
   if (refiner_.has_value()) refiner_->Clear();
+  if (aligner_.has_value()) aligner_->Clear();
   back_end_->mapper().SetCullsKeyframes(true);  // in case Finish threw
   pieces_cut_ = 0;
   frames_refuted_ = 0;
@@ -271,7 +274,8 @@ void Finisher::RefineMap(const std::function<bool()>& should_stop, MotionNoises*
     std::vector<FrameView> views;
     tracked_->Replace(refiner_->Refine(tracked_->Poses(), should_stop, &views));
     if (views.empty() && !options_.mapper.motion_prior) return;  // keyframes tell all
-    const PathEvidence path{views, noises};
+    PathEvidence path{views, noises};
+    if (aligner_.has_value()) path.aligned = aligner_->Align(should_stop, &views);
     if (!AdjustAll(camera_, options_.mapper, should_stop, map_, &path).usable) return;
   }
 }
@@ -288,6 +292,7 @@ void Finisher::RefinePath(const MotionNoises& noises, const std::function<bool()
   tracked_->Remove(refuted);
   frames_refuted_ += refuted.size();
   if (!adjusts) return;
+  if (aligner_.has_value()) aligner_->AlignViews(should_stop, &views);
   AdjustPath(camera_, options_.mapper.final_bundle, noises, should_stop, map_, &views);
   tracked_->Move(views);
 }

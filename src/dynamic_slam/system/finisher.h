@@ -17,6 +17,7 @@
 #include "dynamic_slam/tracking/backfiller.h"
 #include "dynamic_slam/tracking/bridge_finder.h"
 #include "dynamic_slam/tracking/pose_refiner.h"
+#include "dynamic_slam/tracking/sighting_aligner.h"
 #include "dynamic_slam/tracking/tracker.h"
 
 namespace dynamic_slam {
@@ -28,8 +29,8 @@ class Finisher {
   Finisher(const Camera& camera, const SystemOptions& options, RunMode mode, SharedMap* map,
            BackEnd* back_end, TrackedFrames* tracked);
 
-  // A frame that tracking has done.
-  void Remember(const Frame& frame, const TrackingResult& tracking);
+  // A frame that tracking has done. grey: the image in which its keypoints are.
+  void Remember(const Frame& frame, const TrackingResult& tracking, const cv::Mat& grey);
 
   // To be called when the back end is drained: adjusts the whole map and, offline, finds poses of frames that
   // have none yet, joins parts of which one goes on where another ends, grows over parts that nothing joined,
@@ -96,8 +97,9 @@ class Finisher {
   BackEnd* back_end_;
   TrackedFrames* tracked_;
   BridgeFinder bridge_finder_;
-  std::optional<Backfiller> backfiller_;  // offline, unless it is turned off
-  std::optional<PoseRefiner> refiner_;    // offline, unless it is turned off
+  std::optional<Backfiller> backfiller_;    // offline, unless it is turned off
+  std::optional<PoseRefiner> refiner_;      // offline, unless it is turned off
+  std::optional<SightingAligner> aligner_;  // where there is a refiner, unless it is turned off
   int pieces_cut_ = 0;
   size_t frames_refuted_ = 0;
 };

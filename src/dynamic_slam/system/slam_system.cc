@@ -134,7 +134,7 @@ void SlamSystem::Remember(const FrameResult& result) {
     }
     tracked_.Add({frame.timestamp_s, frame.reference, frame.cam_from_reference}, true);
   }
-  finisher_.Remember(frame, tracking);
+  finisher_.Remember(frame, tracking, grey_);
 }
 
 BundleSummary SlamSystem::Finish(const std::function<bool()>& should_stop) {

@@ -20,6 +20,7 @@ struct SystemOptions {
   bool backfill_grows_map = true;
   bool grow_twice = true;
   bool refine_poses = true;
+  bool align_sightings = true;
   bool smooth_path = true;
   ImageOptions image;
   DetectionOptions detector;
@@ -52,6 +53,12 @@ struct SystemOptions {
           OptionField{"", 0, 1,
                       "Offline: frames are tracked once more in the finished map, which knows more than when "
                       "their turn came; with final_bundle it is adjusted to what they see."});
+    visit("align_sightings", self.align_sightings,
+          OptionField{
+              "", 0, 1,
+              "With refine_poses: where frames see landmarks is found again in the images, to a "
+              "fraction of a pixel, as one keyframe shows them. The images are kept in a temporary file, "
+              "of 4 GiB at most."});
     visit("smooth_path", self.smooth_path,
           OptionField{
               "", 0, 1,

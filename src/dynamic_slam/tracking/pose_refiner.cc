@@ -31,8 +31,11 @@ FrameView ViewOf(const Frame& frame) {
   for (size_t i = 0; i < frame.landmarks.size(); ++i) {
     const Keypoint& keypoint = frame.features.keypoints[i];
     if (!frame.landmarks[i].IsValid()) continue;
-    all.push_back(
-        {frame.landmarks[i], {keypoint.x, keypoint.y}, keypoint.octave, frame.StaticProbability(i)});
+    all.push_back({frame.landmarks[i],
+                   {keypoint.x, keypoint.y},
+                   keypoint.octave,
+                   frame.StaticProbability(i),
+                   {keypoint.raw_x, keypoint.raw_y}});
   }
   FrameView view{frame.timestamp_s, PartId(), frame.cam_from_world, {}};
   const size_t count = std::min(all.size(), kMostSightings);
