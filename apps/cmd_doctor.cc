@@ -131,6 +131,10 @@ void PrintClip(const DoctorArguments& arguments) {
     Line("shutter",
          fmt::format("with readout_s: {:.3f} instead of {:.3f}, errors of a map are {:.0f} % smaller",
                      calibration->readout_s, camera->readout_s, 100 * calibration->readout_gain));
+    if (camera->model == LensModel::kRadialTangential) {
+      Line("lens", fmt::format("with k1: {:.4f}, k2: {:.4f}, errors of a map are {:.1f} % smaller",
+                               calibration->k1, calibration->k2, 100 * calibration->lens_gain));
+    }
   }
   for (const SourceProblem& problem : source->Problems())
     Line("skipped", problem.name + ": " + problem.reason);

@@ -149,6 +149,30 @@ TEST_F(ClipDiagnosisTest, AWrongFocalLengthIsSeen) {
   }
 }
 
+TEST_F(ClipDiagnosisTest, AWrongLensIsSeen) {
+  const Camera pinhole = DefaultRoomCamera();
+  Camera barrel = pinhole;
+  barrel.k1 = 0.08;  // moves the corners by some ten pixels
+  for (const Camera& camera : {pinhole, barrel}) {
+    Clip clip(kFrames, Image), again(kFrames, Image);
+    const ClipMeasures measures = MeasureClip(camera, &clip);
+    const std::optional<SelfCalibration> found = CalibrateByMap(camera, &again);
+    ASSERT_TRUE(found.has_value());
+    const double bound = std::hypot(pinhole.cx / pinhole.fx, pinhole.cy / pinhole.fy);
+    const auto stretch = [&](double r2) { return r2 * (found->k1 + r2 * found->k2); };
+    EXPECT_LT(std::abs(stretch(0.5 * bound * bound)), 0.01) << found->k1 << " " << found->k2;
+    if (camera.k1 == 0) {
+      EXPECT_LT(found->lens_gain, 0.02);
+      continue;
+    }
+    EXPECT_GT(found->lens_gain, 0.02);
+    const std::vector<ClipAdvice> advice = AdviseOnClip(measures, found);
+    ASSERT_FALSE(advice.empty());
+    EXPECT_THAT(advice.front().problem,
+                testing::AnyOf(ClipProblem::kLens, ClipProblem::kCalibration, ClipProblem::kRollingShutter));
+  }
+}
+
 TEST(EdgeWidthTest, GrowsWithTheBlur) {
   cv::Mat1b stripes(240, 320);
   for (int y = 0; y < stripes.rows; ++y) {

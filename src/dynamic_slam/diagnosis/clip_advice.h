@@ -17,7 +17,8 @@ enum class ClipProblem {
   kNoMotion,
   kOnlyRotation,
   kCalibration,
-  kRollingShutter
+  kRollingShutter,
+  kLens
 };
 
 struct ClipAdvice {

@@ -16,22 +16,25 @@ namespace {
 
 using PoseBlock = std::array<double, kPoseBlockSize>;
 
-// Reprojection error in sigmas: of a pose, a point in world, the factor on the focal lengths and what is to
-// be added to the readout.
+// Reprojection error in sigmas: of a pose, a point in world, the factor on the focal lengths, what is to be
+// added to the readout and to the lens's k1 and k2.
 struct CalibrationCost {
   Eigen::Vector2d focal_px, from_center_px;
   Eigen::Vector2d row_flow_px;  // by which the keypoint goes back for each second of readout
   double inverse_sigma_px;
 
   template <class T>
-  bool operator()(const T* pose, const T* point, const T* factor, const T* readout_s, T* residuals) const {
+  bool operator()(const T* pose, const T* point, const T* factor, const T* readout_s, const T* lens,
+                  T* residuals) const {
     const Eigen::Map<const Eigen::Quaternion<T>> q(pose);
     const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t(pose + 4), x_in_world(point);
     const Eigen::Matrix<T, 3, 1> x = q * x_in_world + t;
     if (x.z() < T(kMinProjectionDepth)) return false;
+    const T tangent2 = (x.x() * x.x() + x.y() * x.y()) / (x.z() * x.z());
+    const T stretch = *factor * (T(1) + tangent2 * (lens[0] + tangent2 * lens[1]));
     for (int i = 0; i < 2; ++i) {
       const T seen = from_center_px[i] - *readout_s * row_flow_px[i];
-      residuals[i] = (*factor * focal_px[i] * x[i] / x.z() - seen) * inverse_sigma_px;
+      residuals[i] = (stretch * focal_px[i] * x[i] / x.z() - seen) * inverse_sigma_px;
     }
     return true;
   }
@@ -66,7 +69,7 @@ Eigen::Vector2d RowFlow(const Camera& camera, const Keyframe& keyframe, const Ke
 
 std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& map,
                                               const Trajectory& frames) {
-  constexpr size_t kFewestKeyframes = 5, kMostKeyframes = 60, kFewestSightings = 3;
+  constexpr size_t kFewestKeyframes = 5, kMostKeyframes = 120, kFewestSightings = 3;
   std::map<KeyframeId, PoseBlock> poses;
   std::map<KeyframeId, std::optional<SteadyMotion>> motions;
   map.keyframes().ForEach([&](const Keyframe& keyframe) {
@@ -81,6 +84,7 @@ std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& m
   ceres::Problem problem;
   std::map<LandmarkId, Eigen::Vector3d> points;
   double factor = 1, more_readout_s = 0;
+  std::array<double, 2> lens{};
   map.landmarks().ForEach([&](const Landmark& landmark) {
     std::vector<Observation> seen;
     for (const Observation& observation : landmark.observations()) {
@@ -93,12 +97,13 @@ std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& m
       const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
       const double sigma_px = map.octave_scales()[static_cast<size_t>(keypoint.octave)];
       problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<CalibrationCost, 2, kPoseBlockSize, 3, 1, 1>(new CalibrationCost{
+          new ceres::AutoDiffCostFunction<CalibrationCost, 2, kPoseBlockSize, 3, 1, 1, 2>(new CalibrationCost{
               {camera.fx, camera.fy},
               {keypoint.x - camera.cx, keypoint.y - camera.cy},
               RowFlow(camera, keyframe, keypoint, landmark.position(), motions.at(observation.keyframe)),
               1 / sigma_px}),
-          new ceres::HuberLoss(2), poses.at(observation.keyframe).data(), point, &factor, &more_readout_s);
+          new ceres::HuberLoss(2), poses.at(observation.keyframe).data(), point, &factor, &more_readout_s,
+          lens.data());
     }
   });
   if (points.empty()) return std::nullopt;
@@ -125,20 +130,28 @@ std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& m
   problem.SetParameterUpperBound(&more_readout_s, 0, Camera::kMaxReadout_s - camera.readout_s);
   problem.SetParameterBlockConstant(&factor);
   problem.SetParameterBlockConstant(&more_readout_s);
+  problem.SetParameterBlockConstant(lens.data());
   const std::optional<double> with_own = solve(nullptr), with_readout = solve(&more_readout_s);
   SelfCalibration found{.readout_s = camera.readout_s + more_readout_s};
   more_readout_s = 0;
+  const bool has_lens = camera.model == LensModel::kRadialTangential;
+  const std::optional<double> with_lens = has_lens ? solve(lens.data()) : with_own;
+  found.k1 = camera.k1 + lens[0];
+  found.k2 = camera.k2 + lens[1];
+  lens = {};
   const std::optional<double> with_focal = solve(&factor);
-  if (!with_own || !with_readout || !with_focal) return std::nullopt;
+  if (!with_own || !with_readout || !with_lens || !with_focal) return std::nullopt;
   found.focal_factor = factor;
   found.focal_gain = 1 - *with_focal / *with_own;
   found.readout_gain = 1 - *with_readout / *with_own;
+  found.lens_gain = 1 - *with_lens / *with_own;
   return found;
 }
 
 std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, FrameSource* source) {
   SystemOptions options;
   options.backfill = false;
+  options.align_sightings = false;  // the keypoints are what is looked at
   SlamSystem system(camera, options);
   const RunSummary summary = RunSequence(*source, system);
   if (summary.failure != nullptr) std::rethrow_exception(summary.failure);

@@ -53,11 +53,6 @@ TEST_F(PatchAlignmentTest, FindsItTurnedEnlargedAndInOtherLight) {
       AlignPatch(patch_, level, A.cast<float>(), to_.cast<float>() + Eigen::Vector2f(0.8f, 0.7f));
   ASSERT_TRUE(found.has_value());
   EXPECT_LT((*found - to_.cast<float>()).norm(), 0.05);
-  EXPECT_FALSE(
-      AlignPatch(patch_, level, Eigen::Matrix2f::Identity(), to_.cast<float>()).has_value() &&
-      (*AlignPatch(patch_, level, Eigen::Matrix2f::Identity(), to_.cast<float>()) - to_.cast<float>())
-              .norm() < 0.02)
-      << "not as it was";
 }
 
 TEST_F(PatchAlignmentTest, WhatIsNotThereIsNotFound) {
