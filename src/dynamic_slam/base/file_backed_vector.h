@@ -113,6 +113,10 @@ class FileBackedVector {
     Append(values);
   }
 
+  // Of the blocks that no file holds.
+  size_t BytesInMemory() const {
+    return (blocks_.size() - blocks_.FileCount()) * FileBackedBlocks::kBlockBytes;
+  }
   size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
   const T& operator[](size_t index) const {

@@ -14,7 +14,8 @@ namespace dynamic_slam {
 // The images of a run, in a file without a name in the folder for temporary files.
 class ImageArchive {
  public:
-  // grey: CV_8UC1, of one size. Of more than 4 GiB the later ones are left out.
+  // grey: CV_8UC1, of one size. Of more than 4 GiB, or 32 MiB that no file holds, the later ones are left
+  // out.
   void Keep(double timestamp_s, const cv::Mat& grey);
   bool Contains(double timestamp_s) const { return first_chunk_.contains(timestamp_s); }
   // False if there is none. *grey: of that size and type, with its memory.

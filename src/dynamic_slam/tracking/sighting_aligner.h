@@ -44,7 +44,8 @@ class SightingAligner {
 
   bool Load(double timestamp_s);  // its image, into pyramid_
   void ChooseReferences(const Map& map);
-  // What it is there; false, and nothing is changed, where the loaded image does not show the landmark.
+  // Moves the sighting, in the image that is loaded; false, and it stays, where that does not show the
+  // landmark.
   bool AlignSighting(const Map& map, const Rigid3& cam_from_world, FrameView::Sighting* sighting) const;
   float SigmaOf(const Reference& reference) const;
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -191,6 +193,23 @@ TEST(ImageArchiveTest, GivesBackWhatItGot) {
   EXPECT_FALSE(archive.Read(2.5, &read));
   archive.Clear();
   EXPECT_FALSE(archive.Read(3, &read));
+}
+
+TEST(ImageArchiveTest, WhereThereIsNoFileMemoryIsNotFilled) {
+  const char* before = std::getenv("TMPDIR");
+  const std::string old = before == nullptr ? "" : before;
+  setenv("TMPDIR", "/proc/no_such_folder", 1);
+  ImageArchive archive;
+  const cv::Mat image(1000, 1000, CV_8UC1, cv::Scalar(7));
+  for (int i = 0; i < 100; ++i) archive.Keep(i, image);
+  if (before == nullptr) {
+    unsetenv("TMPDIR");
+  } else {
+    setenv("TMPDIR", old.c_str(), 1);
+  }
+  EXPECT_TRUE(archive.Contains(25));
+  EXPECT_FALSE(archive.Contains(40));
+  EXPECT_FALSE(archive.Contains(99));
 }
 
 }  // namespace
