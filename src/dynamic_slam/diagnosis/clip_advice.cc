@@ -13,7 +13,7 @@ std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m,
   constexpr double kStill = 0.003, kRotation = 0.9;
   // A map keeps what fits its camera: of a focal length that is a third off, this much is left to see.
   constexpr double kFocalGain = 0.03, kFocalChange = 0.04;
-  constexpr double kLensGain = 0.015;    // KITTI has 0.020, fr1 0.001
+  constexpr double kLensGain = 0.015;    // KITTI has 0.020, fr1 0.003
   constexpr double kReadoutGain = 0.03;  // of the rendered film of 30 ms it is 0.1, of a global shutter 0
   std::vector<ClipAdvice> advice;
   const auto advise = [&advice](ClipProblem problem, std::string text) {
