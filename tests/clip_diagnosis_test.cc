@@ -170,6 +170,11 @@ TEST_F(ClipDiagnosisTest, AWrongLensIsSeen) {
     ASSERT_FALSE(advice.empty());
     EXPECT_THAT(advice.front().problem,
                 testing::AnyOf(ClipProblem::kLens, ClipProblem::kCalibration, ClipProblem::kRollingShutter));
+    const std::vector<ClipAdvice> of_lens =
+        AdviseOnClip(measures, SelfCalibration{.k1 = 0.0241, .k2 = -0.0097, .lens_gain = 0.02});
+    ASSERT_EQ(of_lens.size(), 1u);
+    EXPECT_EQ(of_lens.front().problem, ClipProblem::kLens);
+    EXPECT_THAT(of_lens.front().text, testing::HasSubstr("k1: 0.0241"));
   }
 }
 

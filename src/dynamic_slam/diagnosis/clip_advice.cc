@@ -86,7 +86,8 @@ std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m,
     advise(
         ClipProblem::kLens,
         fmt::format("The lens seems to bend lines otherwise than the camera file says: with k1: {:.4f} and "
-                    "k2: {:.4f} there, errors of the map are {:.0f} % smaller.",
+                    "k2: {:.4f} there, errors of the map are {:.0f} % smaller. Run with "
+                    "align_sightings=true then: without it a path may err by more.",
                     calibration->k1, calibration->k2, 100 * calibration->lens_gain));
   }
   return advice;
