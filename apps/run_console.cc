@@ -116,6 +116,12 @@ void PrintSummary(const RunSummary& summary) {
         "been there\n",
         summary.frames_refuted);
   }
+  if (summary.lens_doubt.has_value()) {
+    fmt::print(
+        "the lens seems to bend lines otherwise than the camera says (about k1 = {:.4f}, k2 = {:.4f}): "
+        "sightings were not aligned; `dynamic_slam doctor` says what to write into a camera file\n",
+        summary.lens_doubt->k1, summary.lens_doubt->k2);
+  }
   for (const PathLeap& leap : summary.leaps) {
     fmt::print(
         "the path leaps {:.2f} s after the first frame, {:.1f} times faster than can be: unless the film has "

@@ -72,5 +72,34 @@ TEST_F(FinishTest, OfTwoWaysToGrowTheSteadierStaysAndAnInterruptLeavesTheFirst) 
     EXPECT_THAT(system->map().Read()->Validate(), IsEmpty());
 }
 
+TEST(FinishLensTest, AMapThatDoubtsTheLensIsNotAlignedToItAndSaysSo) {
+  RoomOptions room_options;
+  room_options.frames = 60;
+  const Room room(room_options);
+  std::vector<cv::Mat> images;
+  for (int i = 0; i < room_options.frames; ++i) images.push_back(room.Frame(i));
+  Camera barrel = room_options.camera;
+  barrel.k1 = 0.08;  // the room's has none: wrong by ten pixels in the corners
+  const auto run = [&images](const Camera& camera, bool align) {
+    SystemOptions options;
+    options.orb.features = 600;
+    options.align_sightings = align;
+    ImageSource source(images);
+    return RunAll(source, camera, options);
+  };
+  const WholeRun right = run(room_options.camera, true);
+  EXPECT_FALSE(right.system->LensDoubt().has_value());
+  const WholeRun wrong = run(barrel, true), as_it_is = run(barrel, false);
+  ASSERT_TRUE(wrong.system->LensDoubt().has_value());
+  EXPECT_LT(wrong.system->LensDoubt()->k1, 0.06);
+  ASSERT_TRUE(wrong.summary.lens_doubt.has_value());
+  EXPECT_FALSE(as_it_is.summary.lens_doubt.has_value());
+
+  const Trajectory path = wrong.system->FrameTrajectory(), plain = as_it_is.system->FrameTrajectory();
+  ASSERT_EQ(path.size(), plain.size());
+  ASSERT_GT(path.size(), 40u);
+  for (size_t i = 0; i < path.size(); ++i) EXPECT_EQ(path[i].world_from_cam, plain[i].world_from_cam);
+}
+
 }  // namespace
 }  // namespace dynamic_slam

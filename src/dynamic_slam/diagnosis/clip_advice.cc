@@ -13,7 +13,6 @@ std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m,
   constexpr double kStill = 0.003, kRotation = 0.9;
   // A map keeps what fits its camera: of a focal length that is a third off, this much is left to see.
   constexpr double kFocalGain = 0.03, kFocalChange = 0.04;
-  constexpr double kLensGain = 0.015;    // KITTI has 0.020, fr1 0.003
   constexpr double kReadoutGain = 0.03;  // of the rendered film of 30 ms it is 0.1, of a global shutter 0
   std::vector<ClipAdvice> advice;
   const auto advise = [&advice](ClipProblem problem, std::string text) {
@@ -82,12 +81,11 @@ std::vector<ClipAdvice> AdviseOnClip(const ClipMeasures& m,
         fmt::format("The shutter seems to roll: with readout_s: {:.3f} in the camera file, errors of the map "
                     "are {:.0f} % smaller.",
                     calibration->readout_s, 100 * calibration->readout_gain));
-  } else if (calibration.has_value() && calibration->lens_gain > kLensGain) {
+  } else if (calibration.has_value() && calibration->lens_gain > kNotableLensGain) {
     advise(
         ClipProblem::kLens,
         fmt::format("The lens seems to bend lines otherwise than the camera file says: with k1: {:.4f} and "
-                    "k2: {:.4f} there, errors of the map are {:.0f} % smaller. Run with "
-                    "align_sightings=true then: without it a path may err by more.",
+                    "k2: {:.4f} there, errors of the map are {:.0f} % smaller.",
                     calibration->k1, calibration->k2, 100 * calibration->lens_gain));
   }
   return advice;

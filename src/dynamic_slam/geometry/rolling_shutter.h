@@ -1,9 +1,12 @@
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/rigid3.h"
+#include "dynamic_slam/geometry/trajectory.h"
 
 namespace dynamic_slam {
 
@@ -19,6 +22,10 @@ SteadyMotion MotionBetween(const Rigid3& later_from_earlier, double dt_s);
 
 // The mean of two: at the pose between them.
 SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b);
+
+// How the camera moved about a pose of its path, from the one before to the one after it; nothing where there
+// is no pose of that time, or those are farther apart than a motion is steady.
+std::optional<SteadyMotion> MotionAt(const Trajectory& path, double timestamp_s);
 
 // A rolling shutter reads the rows of an image one after the other, for Camera::readout_s in all, and a pose
 // is that of the camera when it reads the middle one. Returns where (ideal px) the camera would have seen

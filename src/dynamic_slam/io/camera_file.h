@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <opencv2/core/types.hpp>
@@ -22,6 +23,10 @@ DYNAMIC_SLAM_API Camera LoadCamera(const std::string& name_or_path);
 
 // The names that LoadCamera knows, sorted.
 DYNAMIC_SLAM_API std::vector<std::string> KnownCameras();
+
+// A camera without distortion gets that of a known one, of this family of names, that is the same but for it:
+// calibrations of rectified images, as KITTI's, say nothing of what is left of the lens.
+Camera WithKnownLens(Camera camera, std::string_view family);
 
 // As ReadCamera reads it.
 DYNAMIC_SLAM_API std::string CameraToYaml(const Camera& camera);

@@ -79,6 +79,23 @@ TEST_F(CameraFile, ShipsTheCamerasOfTheDataSets) {
   EXPECT_EQ(LoadCamera("euroc").p2, 1.76187114e-05);
 }
 
+TEST_F(CameraFile, ACameraLikeAKnownOneButForItsLensGetsThat) {
+  const Camera known = LoadCamera("kitti_00-02");
+  ASSERT_TRUE(known.HasDistortion());
+  Camera camera = known;
+  camera.k1 = camera.k2 = 0;
+  camera.fps = 7;
+  const Camera like = WithKnownLens(camera, "kitti");
+  EXPECT_EQ(std::pair(like.k1, like.k2), std::pair(known.k1, known.k2));
+  EXPECT_EQ(like.fps, 7);
+  EXPECT_FALSE(WithKnownLens(camera, "tum").HasDistortion());
+  camera.fx += 1;
+  EXPECT_FALSE(WithKnownLens(camera, "kitti").HasDistortion());
+  camera.fx = known.fx;
+  camera.k1 = 0.5;
+  EXPECT_EQ(WithKnownLens(camera, "kitti").k1, 0.5);
+}
+
 TEST_F(CameraFile, FindsNamesFromAnyFolderAndPrefersTheUsersOwn) {
   const auto before = std::filesystem::current_path();
   std::filesystem::current_path(folder_);

@@ -51,7 +51,7 @@ class ListedSource : public CheckedSource {
       return ReadCamera(listing_.folder / "camera.yaml");
     if (!fs::is_regular_file(listing_.calib)) return std::nullopt;
     if (Layout() == "euroc") return ImportCamera(listing_.calib);
-    return ReadKittiCalibration(listing_.calib, ImageSize(), MeanFps());
+    return WithKnownLens(ReadKittiCalibration(listing_.calib, ImageSize(), MeanFps()), "kitti");
   }
 
  protected:

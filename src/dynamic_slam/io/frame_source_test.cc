@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "dynamic_slam/base/test_folder.h"
+#include "dynamic_slam/io/camera_file.h"
 #include "dynamic_slam/io/source_layout.h"
 
 namespace dynamic_slam {
@@ -317,6 +318,8 @@ TEST_F(FrameSourceTest, ReadsTheSharedData) {
   const auto camera = OpenFrameSource(SharedData() / "kitti_00_first200/sequences/00")->OwnCamera();
   EXPECT_EQ(camera->fx, 718.856);
   EXPECT_NEAR(camera->fps, 10, 0.5);
+  EXPECT_EQ(camera->k1, LoadCamera("kitti_00-02").k1);  // which its calib.txt lacks
+  EXPECT_GT(camera->k1, 0);
 }
 
 }  // namespace

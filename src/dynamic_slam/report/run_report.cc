@@ -119,6 +119,11 @@ Json TilesSection(const Run& run) {
                          "the finished map does not confirm them, and the camera cannot have been there",
                          "wait"));
   }
+  if (s.lens_doubt.has_value()) {
+    tiles.push_back(Tile("lens", fmt::format("k1 {:.4f}, k2 {:.4f}", s.lens_doubt->k1, s.lens_doubt->k2),
+                         "fits the images better than what the camera says: ask dynamic_slam doctor",
+                         "wait"));
+  }
   if (s.loops.corrected + s.loops.linked > 0) {
     tiles.push_back(Tile("loops closed", fmt::format("{}", s.loops.corrected + s.loops.linked),
                          fmt::format("{} moved the map", s.loops.corrected)));

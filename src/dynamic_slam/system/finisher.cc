@@ -9,6 +9,7 @@
 #include "dynamic_slam/geometry/path_roughness.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 #include "dynamic_slam/mapping/path_bundle.h"
+#include "dynamic_slam/optimize/path_smoother.h"
 #include "dynamic_slam/system/leap_mender.h"
 #include "dynamic_slam/tracking/known_poses.h"
 #include "dynamic_slam/tracking/revisit_finder.h"
@@ -80,6 +81,7 @@ void Finisher::Clear() {
   back_end_->mapper().SetCullsKeyframes(true);  // in case Finish threw
   pieces_cut_ = 0;
   frames_refuted_ = 0;
+  lens_doubt_.reset();
 }
 
 Finisher::State Finisher::Save() const {
@@ -102,30 +104,67 @@ Trajectory Finisher::MainPath() const {
   return parts.empty() ? Trajectory() : tracked_->PathOf(parts.front());
 }
 
+SightingAligner::Paths Finisher::SmoothPaths() const {
+  SightingAligner::Paths paths;
+  if (!(camera_.readout_s > 0)) return paths;
+  for (const PartId part : tracked_->Parts()) {
+    Trajectory& path = paths[part] = tracked_->PathOf(part);
+    const std::vector<Rigid3> smooth = SmoothPath(path);
+    for (size_t i = 0; i < path.size(); ++i) path[i].world_from_cam = smooth[i];
+  }
+  return paths;
+}
+
 BundleSummary Finisher::Finish(const std::function<bool()>& should_stop) {
   DS_TRACE("finish");
   const auto is_stopped = [&should_stop] { return should_stop && should_stop(); };
   const bool grows = MayGrow() && backfiller_->PlanGrowth(tracked_->Poses(), should_stop);
-  if (!grows || !options_.grow_twice) return FinishOnce(grows, should_stop);
-
-  State before = Save();
-  const int culled_before = before.reports.mapping.keyframes_culled;
-  const BundleSummary bundle = FinishOnce(true, should_stop);
-  if (back_end_->mapping_report().keyframes_culled == culled_before || is_stopped()) return bundle;
+  std::optional<State> before;
+  if (grows && options_.grow_twice) before = Save();
+  const BundleSummary bundle = Complete(grows, should_stop);
+  const bool aligned = MayAlign(should_stop);
+  const bool is_done_twice = before.has_value() && back_end_->mapping_report().keyframes_culled !=
+                                                       before->reports.mapping.keyframes_culled;
+  std::optional<State> completed;
+  if (is_done_twice && aligned) completed = Save();
+  Refine(aligned, should_stop);
+  if (!is_done_twice || is_stopped()) return bundle;
   State first = Save();
-  const Trajectory first_path = MainPath();
 
-  Restore(std::move(before));
+  // Keypoints alone tell which way is right: where they are aligned, both are steady.
+  if (aligned) {
+    Restore(std::move(*completed));
+    Refine(false, should_stop);
+  }
+  const Trajectory first_path = MainPath();
+  Restore(std::move(*before));
   backfiller_->PlanGrowth(tracked_->Poses(), should_stop);
   back_end_->mapper().SetCullsKeyframes(false);
-  const BundleSummary second_bundle = FinishOnce(true, should_stop);
+  const BundleSummary second_bundle = Complete(true, should_stop);
   back_end_->mapper().SetCullsKeyframes(true);
-  if (!is_stopped() && IsBetter(MainPath(), first_path)) return second_bundle;
+  if (aligned) completed = Save();
+  Refine(false, should_stop);
+  const bool is_better = IsBetter(MainPath(), first_path);
+  if (is_better && aligned) {
+    Restore(std::move(*completed));
+    Refine(true, should_stop);
+  }
+  if (is_better && !is_stopped()) return second_bundle;
   Restore(std::move(first));
   return bundle;
 }
 
-BundleSummary Finisher::FinishOnce(bool grows, const std::function<bool()>& should_stop) {
+bool Finisher::MayAlign(const std::function<bool()>& should_stop) {
+  if (!aligner_.has_value() || !ChangesMap() || (should_stop && should_stop())) return false;
+  DS_TRACE("finish/lens");
+  const auto map = map_->Read();
+  if (map->Parts().empty()) return false;
+  const std::optional<SelfCalibration> found = CalibrateLensByMap(camera_, *map);
+  if (found.has_value() && found->lens_gain > kNotableLensGain) lens_doubt_ = found;
+  return !lens_doubt_.has_value();
+}
+
+BundleSummary Finisher::Complete(bool grows, const std::function<bool()>& should_stop) {
   if (MayGrow()) {
     if (grows) tracked_->AddFound(Grow(tracked_->Poses(), should_stop));
     back_end_->Drain();
@@ -133,26 +172,28 @@ BundleSummary Finisher::FinishOnce(bool grows, const std::function<bool()>& shou
     if (refiner_.has_value()) GrowOverParts(should_stop);
     if (options_.loop.enabled) JoinAlikeParts(should_stop);
   }
-  const bool adjusts = options_.final_bundle && ChangesMap();
   BundleSummary bundle;
-  if (adjusts) {
+  if (AdjustsMap()) {
     bundle = back_end_->mapper().Finish(should_stop);
     if (options_.loop.enabled && LinkRevisits(should_stop)) bundle = back_end_->mapper().Finish(should_stop);
   }
   if (backfiller_.has_value()) tracked_->AddFound(backfiller_->Find(tracked_->Poses(), should_stop));
+  return bundle;
+}
+
+void Finisher::Refine(bool aligned, const std::function<bool()>& should_stop) {
   if (refiner_.has_value() && ChangesMap()) {
     MotionNoises noises;
-    if (adjusts) RefineMap(should_stop, &noises);
-    RefinePath(noises, should_stop);
+    if (AdjustsMap()) RefineMap(aligned, should_stop, &noises);
+    RefinePath(aligned, noises, should_stop);
     // Without the frames between nobody knows whether the path leaps.
     if (backfiller_.has_value()) {
       LeapMender mender(camera_, options_.tracker, options_.seed, *refiner_, tracked_, map_);
       pieces_cut_ = mender.CutOffSides(should_stop) + mender.MendEnds(should_stop);
-      if (pieces_cut_ > 0) RefinePath(noises, should_stop);
+      if (pieces_cut_ > 0) RefinePath(aligned, noises, should_stop);
     }
   }
   if (Smooths()) tracked_->Smooth(should_stop);
-  return bundle;
 }
 
 std::vector<AnchoredPose> Finisher::Grow(std::span<const AnchoredPose> known,
@@ -269,18 +310,19 @@ bool Finisher::LinkRevisits(const std::function<bool()>& should_stop) {
   return links > 0;
 }
 
-void Finisher::RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises) {
+void Finisher::RefineMap(bool aligned, const std::function<bool()>& should_stop, MotionNoises* noises) {
   for (int round = 0; round < kViewRounds; ++round) {
     std::vector<FrameView> views;
     tracked_->Replace(refiner_->Refine(tracked_->Poses(), should_stop, &views));
     if (views.empty() && !options_.mapper.motion_prior) return;  // keyframes tell all
     PathEvidence path{views, noises};
-    if (aligner_.has_value()) path.aligned = aligner_->Align(should_stop, &views);
+    if (aligned) path.aligned = aligner_->Align(SmoothPaths(), should_stop, &views);
     if (!AdjustAll(camera_, options_.mapper, should_stop, map_, &path).usable) return;
   }
 }
 
-void Finisher::RefinePath(const MotionNoises& noises, const std::function<bool()>& should_stop) {
+void Finisher::RefinePath(bool aligned, const MotionNoises& noises,
+                          const std::function<bool()>& should_stop) {
   const std::vector<AnchoredPose> before = tracked_->Poses();
   const bool adjusts = Smooths() && options_.mapper.motion_prior;
   std::vector<FrameView> views;
@@ -292,7 +334,7 @@ void Finisher::RefinePath(const MotionNoises& noises, const std::function<bool()
   tracked_->Remove(refuted);
   frames_refuted_ += refuted.size();
   if (!adjusts) return;
-  if (aligner_.has_value()) aligner_->AlignViews(should_stop, &views);
+  if (aligned) aligner_->AlignViews(SmoothPaths(), should_stop, &views);
   AdjustPath(camera_, options_.mapper.final_bundle, noises, should_stop, map_, &views);
   tracked_->Move(views);
 }

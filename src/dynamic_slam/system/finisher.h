@@ -10,6 +10,7 @@
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/mapping/bundle_terms.h"
+#include "dynamic_slam/mapping/map_calibration.h"
 #include "dynamic_slam/system/back_end.h"
 #include "dynamic_slam/system/run_mode.h"
 #include "dynamic_slam/system/system_options.h"
@@ -42,6 +43,7 @@ class Finisher {
   // See SlamSystem.
   int pieces_cut() const { return pieces_cut_; }
   size_t frames_refuted() const { return frames_refuted_; }
+  const std::optional<SelfCalibration>& lens_doubt() const { return lens_doubt_; }
 
   void Clear();
 
@@ -60,11 +62,21 @@ class Finisher {
 
   bool ChangesMap() const { return !options_.tracker.localise_only; }
   bool MayGrow() const { return backfiller_.has_value() && options_.backfill_grows_map && ChangesMap(); }
+  // Whether sightings may be aligned: not where the map asks for another lens, as that would make more of the
+  // wrong one.
+  bool MayAlign(const std::function<bool()>& should_stop);
+  bool AdjustsMap() const { return options_.final_bundle && ChangesMap(); }
   bool Smooths() const { return options_.smooth_path && mode_ == RunMode::kOffline; }
   Trajectory MainPath() const;
+  // Of a rolling shutter's camera, for the aligner.
+  SightingAligner::Paths SmoothPaths() const;
 
-  // grows: by a plan that the backfiller has.
-  BundleSummary FinishOnce(bool grows, const std::function<bool()>& should_stop);
+  // Finds poses of frames that have none, and makes one of parts of the map that fit together. grows: by a
+  // plan that the backfiller has.
+  BundleSummary Complete(bool grows, const std::function<bool()>& should_stop);
+  // Adjusts the map and the path to each other. aligned: to where the images show landmarks, else to where
+  // keypoints are.
+  void Refine(bool aligned, const std::function<bool()>& should_stop);
   // Lets the map grow by frames that have no pose, as planned. Returns all poses that were found.
   std::vector<AnchoredPose> Grow(std::span<const AnchoredPose> known,
                                  const std::function<bool()>& should_stop);
@@ -85,10 +97,10 @@ class Finisher {
   bool LinkRevisits(const std::function<bool()>& should_stop);
   // Adjusts the map to what frames see that are tracked once more in it. noises: gets how the camera was
   // moved, where that is known.
-  void RefineMap(const std::function<bool()>& should_stop, MotionNoises* noises);
+  void RefineMap(bool aligned, const std::function<bool()>& should_stop, MotionNoises* noises);
   // Tracks frames once more in the finished map. Poses that it refutes are given up; the path of the others
   // becomes what is most probable.
-  void RefinePath(const MotionNoises& noises, const std::function<bool()>& should_stop);
+  void RefinePath(bool aligned, const MotionNoises& noises, const std::function<bool()>& should_stop);
 
   const Camera& camera_;
   const SystemOptions& options_;
@@ -102,6 +114,7 @@ class Finisher {
   std::optional<SightingAligner> aligner_;  // where there is a refiner, unless it is turned off
   int pieces_cut_ = 0;
   size_t frames_refuted_ = 0;
+  std::optional<SelfCalibration> lens_doubt_;
 };
 
 }  // namespace dynamic_slam

@@ -84,6 +84,11 @@ nlohmann::ordered_json ToJson(const RunSummary& summary) {
                           {"final_cost", summary.final_bundle.final_cost}};
   json["pieces_cut"] = summary.pieces_cut;
   json["frames_refuted"] = summary.frames_refuted;
+  if (summary.lens_doubt.has_value()) {
+    json["lens_doubt"] = {{"k1", summary.lens_doubt->k1},
+                          {"k2", summary.lens_doubt->k2},
+                          {"gain", summary.lens_doubt->lens_gain}};
+  }
   json["leaps"] = nlohmann::ordered_json::array();
   for (const PathLeap& leap : summary.leaps) {
     json["leaps"].push_back(

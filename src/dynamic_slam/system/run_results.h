@@ -52,8 +52,9 @@ struct RunSummary {
   double startup_s = 0;  // from the start of the process to the first frame
   double wall_s = 0;     // from the first frame to the final map
   double peak_rss_mb = 0;
-  int pieces_cut = 0;         // of the path, that stood wrong (SlamSystem::PiecesCut)
-  size_t frames_refuted = 0;  // by the finished map (SlamSystem::FramesRefuted)
+  int pieces_cut = 0;                         // of the path, that stood wrong (SlamSystem::PiecesCut)
+  size_t frames_refuted = 0;                  // by the finished map (SlamSystem::FramesRefuted)
+  std::optional<SelfCalibration> lens_doubt;  // SlamSystem::LensDoubt
   // Where the path of the main map leaps: unless the film has a cut there, one side stands wrong.
   std::vector<PathLeap> leaps;
   std::optional<MetricScale> scale;  // of the main part of the map, if anything says how long its unit is

@@ -159,6 +159,7 @@ RunSummary RunSequence(FrameSource& source, SlamSystem& system, const RunControl
     summary.frames_in_other_maps += system.FrameTrajectory(parts[i]).size();
   summary.pieces_cut = system.PiecesCut();
   summary.frames_refuted = system.FramesRefuted();
+  summary.lens_doubt = system.LensDoubt();
   summary.leaps = FindLeaps(path);
   {
     const auto map = system.map().Read();

@@ -99,6 +99,10 @@ class SlamSystem {
   // it did: they have none any more.
   size_t FramesRefuted() const { return finisher_.frames_refuted(); }
 
+  // The lens that the finished map asks for, where it fits the images notably better than that of the camera:
+  // then sightings were not aligned, and `dynamic_slam doctor` is to be asked.
+  const std::optional<SelfCalibration>& LensDoubt() const { return finisher_.lens_doubt(); }
+
   // None without a detector.
   std::optional<DetectionReport> detection_report() const {
     return detection_.has_value() ? std::optional(detection_->report()) : std::nullopt;

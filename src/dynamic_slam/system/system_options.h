@@ -20,7 +20,7 @@ struct SystemOptions {
   bool backfill_grows_map = true;
   bool grow_twice = true;
   bool refine_poses = true;
-  bool align_sightings = false;
+  bool align_sightings = true;
   bool smooth_path = true;
   ImageOptions image;
   DetectionOptions detector;

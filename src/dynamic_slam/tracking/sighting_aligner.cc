@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <optional>
 
 #include "dynamic_slam/base/trace.h"
 
@@ -34,14 +32,15 @@ bool SightingAligner::Load(double timestamp_s) {
   return true;
 }
 
-AlignedKeypoints SightingAligner::Align(const std::function<bool()>& should_stop,
+AlignedKeypoints SightingAligner::Align(const Paths& paths, const std::function<bool()>& should_stop,
                                         std::vector<FrameView>* views) {
-  AlignViews(should_stop, views);
+  AlignViews(paths, should_stop, views);
   AlignedKeypoints aligned;
   const auto map = map_->Read();
   map->keyframes().ForEach([&](const Keyframe& keyframe) {
     if ((should_stop && should_stop()) || !keyframe.frame_id().IsValid()) return;
     if (!Load(keyframe.timestamp_s())) return;
+    const View view = ViewOf(paths, keyframe.part(), keyframe.timestamp_s(), keyframe.cam_from_world());
     std::vector<AlignedKeypoint>& of_keyframe = aligned[keyframe.id()];
     of_keyframe.resize(keyframe.features().size());
     keyframe.ForEachLandmark([&](uint32_t i, LandmarkId landmark) {
@@ -53,8 +52,9 @@ AlignedKeypoints SightingAligner::Align(const std::function<bool()>& should_stop
                                 reference->second.observation.keyframe == keyframe.id() &&
                                 reference->second.observation.keypoint == i;
       if (is_reference) {
+        Place(view, map->landmarks().At(landmark).position(), sighting.raw_px, &sighting);
         of_keyframe[i] = {sighting.ideal_px, SigmaOf(reference->second)};
-      } else if (AlignSighting(*map, keyframe.cam_from_world(), &sighting)) {
+      } else if (AlignSighting(*map, view, &sighting)) {
         of_keyframe[i] = {sighting.ideal_px, sighting.sigma_px};
       }
     });
@@ -62,15 +62,24 @@ AlignedKeypoints SightingAligner::Align(const std::function<bool()>& should_stop
   return aligned;
 }
 
-void SightingAligner::AlignViews(const std::function<bool()>& should_stop, std::vector<FrameView>* views) {
+void SightingAligner::AlignViews(const Paths& paths, const std::function<bool()>& should_stop,
+                                 std::vector<FrameView>* views) {
   DS_TRACE("align");
   const auto map = map_->Read();
   ChooseReferences(*map);
   for (FrameView& view : *views) {
     if (should_stop && should_stop()) return;
     if (!Load(view.timestamp_s)) continue;
-    for (FrameView::Sighting& sighting : view.sightings) AlignSighting(*map, view.cam_from_world, &sighting);
+    const View seen = ViewOf(paths, view.part, view.timestamp_s, view.cam_from_world);
+    for (FrameView::Sighting& sighting : view.sightings) AlignSighting(*map, seen, &sighting);
   }
+}
+
+SightingAligner::View SightingAligner::ViewOf(const Paths& paths, PartId part, double timestamp_s,
+                                              const Rigid3& cam_from_world) const {
+  const auto path = paths.find(part);
+  const bool has_motion = camera_.readout_s > 0 && path != paths.end();
+  return {cam_from_world, has_motion ? MotionAt(path->second, timestamp_s) : std::nullopt};
 }
 
 // Of the keyframes that see a landmark the middle one in time: others show it from no more than half of the
@@ -105,14 +114,13 @@ void SightingAligner::ChooseReferences(const Map& map) {
   }
 }
 
-bool SightingAligner::AlignSighting(const Map& map, const Rigid3& cam_from_world,
-                                    FrameView::Sighting* sighting) const {
+bool SightingAligner::AlignSighting(const Map& map, const View& view, FrameView::Sighting* sighting) const {
   const auto found = references_.find(sighting->landmark.value());
   const Landmark* landmark = map.landmarks().Find(sighting->landmark);
   if (found == references_.end() || landmark == nullptr) return false;
   const Reference& reference = found->second;
   const Rigid3& reference_from_world = map.keyframes().At(reference.observation.keyframe).cam_from_world();
-  const Rigid3 cam_from_reference = cam_from_world * reference_from_world.Inverse();
+  const Rigid3 cam_from_reference = view.cam_from_world * reference_from_world.Inverse();
   const Eigen::Vector3d x = reference_from_world * landmark->position();
   if (!(x.z() > 0) || !((cam_from_reference * x).z() > 0)) return false;
 
@@ -140,14 +148,22 @@ bool SightingAligner::AlignSighting(const Map& map, const Rigid3& cam_from_world
   const std::optional<Eigen::Vector2f> at =
       AlignPatch(reference.patch, level.image, level_from_patch, level.FromFull(sighting->raw_px));
   if (!at.has_value()) return false;
-  const Eigen::Vector2f raw_px = level.ToFull(*at);
-  // As much as the raw pixel moves; what a rolling shutter adds stays.
-  sighting->ideal_px +=
-      (camera_.Undistort(raw_px.cast<double>()) - camera_.Undistort(sighting->raw_px.cast<double>()))
-          .cast<float>();
-  sighting->raw_px = raw_px;
+  Place(view, landmark->position(), level.ToFull(*at), sighting);
   sighting->sigma_px = SigmaOf(reference);
   return true;
+}
+
+void SightingAligner::Place(const View& view, const Eigen::Vector3d& x_in_world,
+                            const Eigen::Vector2f& raw_px, FrameView::Sighting* sighting) const {
+  const Eigen::Vector2d read_px = camera_.Undistort(raw_px.cast<double>());
+  if (view.motion.has_value()) {
+    const double depth = (view.cam_from_world * x_in_world).z();
+    sighting->ideal_px = AtMiddleRow(camera_, *view.motion, read_px, raw_px.y(), 1 / depth).cast<float>();
+  } else {
+    // As much as the raw pixel moves; what a rolling shutter added stays.
+    sighting->ideal_px += (read_px - camera_.Undistort(sighting->raw_px.cast<double>())).cast<float>();
+  }
+  sighting->raw_px = raw_px;
 }
 
 float SightingAligner::SigmaOf(const Reference& reference) const {

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -10,6 +12,8 @@
 #include "dynamic_slam/features/image_pyramid.h"
 #include "dynamic_slam/features/patch_alignment.h"
 #include "dynamic_slam/geometry/camera.h"
+#include "dynamic_slam/geometry/rolling_shutter.h"
+#include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/tracking/image_archive.h"
@@ -21,17 +25,21 @@ namespace dynamic_slam {
 // images are kept in a file.
 class SightingAligner {
  public:
+  using Paths = std::map<PartId, Trajectory>;
+
   SightingAligner(const Camera& camera, SharedMap* map);
 
   // grey: CV_8UC1 of the camera's size, what the frame's keypoints were found in.
   void Keep(double timestamp_s, const cv::Mat& grey) { images_.Keep(timestamp_s, grey); }
 
   // In the map as it is now, with poses that are right to some pixels: moves the sightings of the views, and
-  // returns where keyframes see landmarks, of those that are found. `should_stop` may be empty; when it says
-  // so, the others stay.
-  AlignedKeypoints Align(const std::function<bool()>& should_stop, std::vector<FrameView>* views);
+  // returns where keyframes see landmarks, of those that are found. paths: of the map's parts, from which a
+  // rolling shutter takes how the camera moved. `should_stop` may be empty; when it says so, the others stay.
+  AlignedKeypoints Align(const Paths& paths, const std::function<bool()>& should_stop,
+                         std::vector<FrameView>* views);
   // The same without the keyframes.
-  void AlignViews(const std::function<bool()>& should_stop, std::vector<FrameView>* views);
+  void AlignViews(const Paths& paths, const std::function<bool()>& should_stop,
+                  std::vector<FrameView>* views);
 
   void Clear() { images_.Clear(); }
 
@@ -44,9 +52,17 @@ class SightingAligner {
 
   bool Load(double timestamp_s);  // its image, into pyramid_
   void ChooseReferences(const Map& map);
-  // Moves the sighting, in the image that is loaded; false, and it stays, where that does not show the
-  // landmark.
-  bool AlignSighting(const Map& map, const Rigid3& cam_from_world, FrameView::Sighting* sighting) const;
+  // Of which an image is loaded.
+  struct View {
+    Rigid3 cam_from_world;
+    std::optional<SteadyMotion> motion;  // of a rolling shutter's camera, if it is known
+  };
+  View ViewOf(const Paths& paths, PartId part, double timestamp_s, const Rigid3& cam_from_world) const;
+  // Moves the sighting; false, and it stays in the image, where that does not show the landmark.
+  bool AlignSighting(const Map& map, const View& view, FrameView::Sighting* sighting) const;
+  // Where the pixel is of what lies at a place in world, when the middle row is read.
+  void Place(const View& view, const Eigen::Vector3d& x_in_world, const Eigen::Vector2f& raw_px,
+             FrameView::Sighting* sighting) const;
   float SigmaOf(const Reference& reference) const;
 
   Camera camera_;

@@ -111,7 +111,7 @@ class SightingAlignerTest : public testing::Test {
 TEST_F(SightingAlignerTest, KeyframesSeeLandmarksWhereTheReferenceShowsThem) {
   KeepImages();
   std::vector<FrameView> views;
-  const AlignedKeypoints aligned = aligner_.Align({}, &views);
+  const AlignedKeypoints aligned = aligner_.Align({}, {}, &views);
   ASSERT_EQ(aligned.size(), keyframes_.size());
   int found = 0, all = 0;
   for (const auto& [id, keypoints] : aligned) {
@@ -134,7 +134,7 @@ TEST_F(SightingAlignerTest, SoDoViewsAndThoseOfOtherImagesStay) {
   aligner_.Keep(StampOf(2.5), Render(PoseAt(2.5), 1.5));                // shows something else
   std::vector<FrameView> views{ViewAt(1.5), ViewAt(2.5), ViewAt(3.5)};  // no image of the last
   const std::vector<FrameView> before = views;
-  aligner_.AlignViews({}, &views);
+  aligner_.AlignViews({}, {}, &views);
   int found = 0;
   for (size_t i = 0; i < points_.size(); ++i) {
     const FrameView::Sighting& sighting = views[0].sightings[i];
@@ -158,19 +158,54 @@ TEST_F(SightingAlignerTest, WhatARollingShutterAddedStays) {
   std::vector<FrameView> views{ViewAt(1)};
   const Eigen::Vector2f shift(2, -3);
   for (FrameView::Sighting& sighting : views[0].sightings) sighting.ideal_px += shift;
-  aligner_.AlignViews({}, &views);
+  aligner_.AlignViews({}, {}, &views);
   for (const FrameView::Sighting& sighting : views[0].sightings)
     EXPECT_LT((sighting.ideal_px - shift - sighting.raw_px).norm(), 1e-3);
+}
+
+TEST_F(SightingAlignerTest, WhatARollingShutterReadGoesToTheMiddleRowWhereThePathTellsHowItMoved) {
+  Camera rolling = camera_;
+  rolling.readout_s = 0.03;
+  SightingAligner aligner(rolling, &shared_map_);
+  SightingAligner::Paths paths;
+  for (size_t i = 0; i < keyframes_.size(); ++i) {
+    const auto at = static_cast<double>(i);
+    aligner.Keep(StampOf(at), Render(PoseAt(at)));
+    paths[PartId(0)].push_back({StampOf(at), PoseAt(at).Inverse()});
+  }
+  const std::optional<SteadyMotion> motion = MotionAt(paths[PartId(0)], StampOf(1));
+  ASSERT_TRUE(motion.has_value());
+  std::vector<FrameView> views{ViewAt(1)};
+  const AlignedKeypoints aligned = aligner.Align(paths, {}, &views);
+  int found = 0;
+  double most = 0;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const FrameView::Sighting& of_view = views[0].sightings[i];
+    const AlignedKeypoint& of_keyframe = aligned.at(keyframes_[1])[i];
+    if (!(of_view.sigma_px > 0 && of_keyframe.sigma_px > 0)) continue;
+    ++found;
+    const Eigen::Vector2d read_px = Expected(PoseAt(1), i);
+    const double depth = (PoseAt(1) * points_[i]).z();
+    const Eigen::Vector2d px = AtMiddleRow(rolling, *motion, read_px, read_px.y(), 1 / depth);
+    most = std::max(most, (px - read_px).norm());
+    EXPECT_LT((of_view.ideal_px.cast<double>() - px).norm(), 0.15) << i;
+    EXPECT_LT((of_keyframe.ideal_px.cast<double>() - px).norm(), 0.15) << i;
+    EXPECT_LT((of_view.raw_px.cast<double>() - read_px).norm(), 0.15) << i;
+  }
+  EXPECT_GT(found, 0.9 * static_cast<double>(points_.size()));
+  EXPECT_GT(most, 0.5);
 }
 
 TEST_F(SightingAlignerTest, WithoutImagesOrWhenStoppedNothingChanges) {
   std::vector<FrameView> views{ViewAt(1)};
   const Eigen::Vector2f before = views[0].sightings[0].ideal_px;
-  EXPECT_THAT(aligner_.Align({}, &views), IsEmpty());
+  EXPECT_THAT(aligner_.Align({}, {}, &views), IsEmpty());
   KeepImages();
-  EXPECT_THAT(aligner_.Align([] { return true; }, &views), IsEmpty());
+  EXPECT_THAT(aligner_.Align(
+                  {}, [] { return true; }, &views),
+              IsEmpty());
   aligner_.Clear();
-  EXPECT_THAT(aligner_.Align({}, &views), IsEmpty());
+  EXPECT_THAT(aligner_.Align({}, {}, &views), IsEmpty());
   EXPECT_EQ(views[0].sightings[0].ideal_px, before);
 }
 
