@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -122,8 +123,16 @@ BenchUnit MakeUnit(const PaperArguments& arguments, const BenchSequence& sequenc
   return unit;
 }
 
-std::string Number(const std::optional<double>& value, double unit, int digits = 3) {
-  return value.has_value() ? fmt::format("{:.{}f}", unit * *value, digits) : "x";
+// With so many decimals; with more where these would leave less than two figures.
+std::string Decimal(double value, int decimals = 3) {
+  constexpr int kMostDecimals = 6;
+  if (value > 0)
+    decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(value))), decimals, kMostDecimals);
+  return fmt::format("{:.{}f}", value, decimals);
+}
+
+std::string Number(const std::optional<double>& value, double unit, int decimals = 3) {
+  return value.has_value() ? Decimal(unit * *value, decimals) : "x";
 }
 
 // Eq. (14): by how much the error is less with semantics.
@@ -135,7 +144,7 @@ std::string Improvement(const std::optional<double>& with, const std::optional<d
 std::string MinMax(const std::vector<double>& values, double unit) {
   if (values.empty()) return "-";
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return fmt::format("{:.3f}–{:.3f}", unit * *low, unit * *high);
+  return fmt::format("{}–{}", Decimal(unit * *low), Decimal(unit * *high));
 }
 
 // What a table says of our own runs.

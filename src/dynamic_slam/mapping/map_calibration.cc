@@ -60,7 +60,11 @@ class CalibrationBundle {
       : camera_(camera) {
     map.keyframes().ForEach([&](const Keyframe& keyframe) {
       if (keyframe.part() != map.Parts().front() || poses_.size() == most_keyframes) return;
-      motions_[keyframe.id()] = MotionAt(frames, keyframe.timestamp_s());
+      // At their ends it is known from one side only, and where a map begins frames are missing there.
+      const double stamp_s = keyframe.timestamp_s();
+      const bool is_between =
+          !frames.empty() && frames.front().timestamp_s < stamp_s && stamp_s < frames.back().timestamp_s;
+      motions_[keyframe.id()] = is_between ? MotionAt(frames, stamp_s) : std::nullopt;
       PoseBlock& block = poses_[keyframe.id()];
       Eigen::Map<Eigen::Quaterniond>(block.data()) = keyframe.cam_from_world().rotation;
       Eigen::Map<Eigen::Vector3d>(block.data() + 4) = keyframe.cam_from_world().translation;
@@ -81,6 +85,7 @@ class CalibrationBundle {
   }
 
   bool IsEmpty() const { return points_.empty(); }
+  int Sightings() const { return problem_.NumResidualBlocks(); }
 
   // Returns the cost that is left with one of the camera's numbers free, or none of them: null.
   std::optional<double> Solve(double* free) {
@@ -166,8 +171,10 @@ std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& m
 
 std::optional<SelfCalibration> CalibrateLensByMap(const Camera& camera, const Map& map) {
   constexpr size_t kMostKeyframes = 60;
+  constexpr int kFewestSightings = 1000;  // of which two numbers explain a thousandth by chance
+  if (camera.model != LensModel::kRadialTangential) return std::nullopt;
   CalibrationBundle bundle(camera, map, {}, kMostKeyframes);
-  if (bundle.IsEmpty()) return std::nullopt;
+  if (bundle.Sightings() < kFewestSightings) return std::nullopt;
   SelfCalibration found{.readout_s = camera.readout_s, .k1 = camera.k1, .k2 = camera.k2};
   const std::optional<double> with_own = bundle.Solve(nullptr);
   if (!with_own || !FindLens(camera, *with_own, &bundle, &found)) return std::nullopt;

@@ -37,7 +37,8 @@ struct SelfCalibration {
 // with it.
 std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& map, const Trajectory& frames);
 
-// Only the lens, of fewer keyframes, and all else the camera's own.
+// Only the lens, of fewer keyframes, and all else the camera's own. Nothing either of another model, or of a
+// map that sees little.
 std::optional<SelfCalibration> CalibrateLensByMap(const Camera& camera, const Map& map);
 
 }  // namespace dynamic_slam
