@@ -119,6 +119,7 @@ class DetectorNodeTest(unittest.TestCase):
         more(poses)
         # A machine that is busy gets its answers late, and then objects are not what was detected just now.
         wait_until(lambda: any(o.is_detected for m in objects.messages[-15:] for o in m.objects), "it sees objects")
+        self.assertTrue(any(o.is_detected for m in objects.messages[-15:] for o in m.objects))
 
     def test_without_a_detector_it_says_so(self):
         node = GRAPH.start("detector_node", "_detector:=none")

@@ -19,11 +19,10 @@ std::optional<SteadyMotion> MotionAt(const Trajectory& path, double timestamp_s)
   const auto at =
       std::lower_bound(path.begin(), path.end(), timestamp_s,
                        [](const StampedPose& pose, double stamp_s) { return pose.timestamp_s < stamp_s; });
-  if (at == path.end() || at->timestamp_s != timestamp_s) return std::nullopt;
-  const StampedPose &before = at == path.begin() ? *at : *(at - 1),
-                    &after = at + 1 == path.end() ? *at : *(at + 1);
+  if (at == path.begin() || at == path.end() || at + 1 == path.end()) return std::nullopt;
+  const StampedPose &before = *(at - 1), &after = *(at + 1);
   const double dt_s = after.timestamp_s - before.timestamp_s;
-  if (!(dt_s > 0) || dt_s > kMostBetween_s) return std::nullopt;
+  if (at->timestamp_s != timestamp_s || !(dt_s > 0) || dt_s > kMostBetween_s) return std::nullopt;
   return MotionBetween(after.world_from_cam.Inverse() * before.world_from_cam, dt_s);
 }
 

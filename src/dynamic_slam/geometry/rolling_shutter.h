@@ -23,8 +23,8 @@ SteadyMotion MotionBetween(const Rigid3& later_from_earlier, double dt_s);
 // The mean of two: at the pose between them.
 SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b);
 
-// How the camera moved about a pose of its path, from the one before to the one after it; nothing where there
-// is no pose of that time, or those are farther apart than a motion is steady.
+// How the camera moved about a pose of its path, from the one before to the one after it; nothing where one
+// of the three is missing, or they are farther apart than a motion is steady.
 std::optional<SteadyMotion> MotionAt(const Trajectory& path, double timestamp_s);
 
 // A rolling shutter reads the rows of an image one after the other, for Camera::readout_s in all, and a pose

@@ -99,17 +99,18 @@ Camera LoadCamera(const std::string& name_or_path) {
 
 std::vector<std::string> KnownCameras() { return ConfigNames("cameras"); }
 
-Camera WithKnownLens(Camera camera, std::string_view family) {
+Camera WithKnownLens(const Camera& camera, std::string_view family) {
   const auto numbers = [](const Camera& c) {
     return std::tuple(c.model, c.width, c.height, c.fx, c.fy, c.cx, c.cy);
   };
   if (camera.HasDistortion()) return camera;
   for (const std::string& name : KnownCameras()) {
     if (!name.starts_with(family)) continue;
-    const Camera known = LoadCamera(name);
+    Camera known = LoadCamera(name);
     if (numbers(known) != numbers(camera)) continue;
-    camera.k1 = known.k1, camera.k2 = known.k2, camera.k3 = known.k3;
-    camera.p1 = known.p1, camera.p2 = known.p2;
+    known.name = camera.name;
+    known.fps = camera.fps;
+    return known;
   }
   return camera;
 }

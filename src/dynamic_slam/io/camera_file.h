@@ -26,7 +26,7 @@ DYNAMIC_SLAM_API std::vector<std::string> KnownCameras();
 
 // A camera without distortion gets that of a known one, of this family of names, that is the same but for it:
 // calibrations of rectified images, as KITTI's, say nothing of what is left of the lens.
-Camera WithKnownLens(Camera camera, std::string_view family);
+Camera WithKnownLens(const Camera& camera, std::string_view family);
 
 // As ReadCamera reads it.
 DYNAMIC_SLAM_API std::string CameraToYaml(const Camera& camera);

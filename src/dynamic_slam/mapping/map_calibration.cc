@@ -60,11 +60,7 @@ class CalibrationBundle {
       : camera_(camera) {
     map.keyframes().ForEach([&](const Keyframe& keyframe) {
       if (keyframe.part() != map.Parts().front() || poses_.size() == most_keyframes) return;
-      // At their ends it is known from one side only, and where a map begins frames are missing there.
-      const double stamp_s = keyframe.timestamp_s();
-      const bool is_between =
-          !frames.empty() && frames.front().timestamp_s < stamp_s && stamp_s < frames.back().timestamp_s;
-      motions_[keyframe.id()] = is_between ? MotionAt(frames, stamp_s) : std::nullopt;
+      motions_[keyframe.id()] = MotionAt(frames, keyframe.timestamp_s());
       PoseBlock& block = poses_[keyframe.id()];
       Eigen::Map<Eigen::Quaterniond>(block.data()) = keyframe.cam_from_world().rotation;
       Eigen::Map<Eigen::Vector3d>(block.data() + 4) = keyframe.cam_from_world().translation;
@@ -84,7 +80,6 @@ class CalibrationBundle {
     for (double* number : {&factor, &more_readout_s, lens.data()}) problem_.SetParameterBlockConstant(number);
   }
 
-  bool IsEmpty() const { return points_.empty(); }
   int Sightings() const { return problem_.NumResidualBlocks(); }
 
   // Returns the cost that is left with one of the camera's numbers free, or none of them: null.
@@ -153,7 +148,7 @@ std::optional<SelfCalibration> CalibrateByMap(const Camera& camera, const Map& m
                                               const Trajectory& frames) {
   constexpr size_t kMostKeyframes = 120;
   CalibrationBundle bundle(camera, map, frames, kMostKeyframes);
-  if (bundle.IsEmpty()) return std::nullopt;
+  if (bundle.Sightings() == 0) return std::nullopt;
   const std::optional<double> with_own = bundle.Solve(nullptr),
                               with_readout = bundle.Solve(&bundle.more_readout_s);
   if (!with_own || !with_readout) return std::nullopt;

@@ -9,7 +9,6 @@
 #include "dynamic_slam/geometry/path_roughness.h"
 #include "dynamic_slam/mapping/map_bundle.h"
 #include "dynamic_slam/mapping/path_bundle.h"
-#include "dynamic_slam/optimize/path_smoother.h"
 #include "dynamic_slam/system/leap_mender.h"
 #include "dynamic_slam/tracking/known_poses.h"
 #include "dynamic_slam/tracking/revisit_finder.h"
@@ -107,11 +106,7 @@ Trajectory Finisher::MainPath() const {
 SightingAligner::Paths Finisher::SmoothPaths() const {
   SightingAligner::Paths paths;
   if (!(camera_.readout_s > 0)) return paths;
-  for (const PartId part : tracked_->Parts()) {
-    Trajectory& path = paths[part] = tracked_->PathOf(part);
-    const std::vector<Rigid3> smooth = SmoothPath(path);
-    for (size_t i = 0; i < path.size(); ++i) path[i].world_from_cam = smooth[i];
-  }
+  for (const PartId part : tracked_->Parts()) paths[part] = tracked_->SmoothPathOf(part);
   return paths;
 }
 

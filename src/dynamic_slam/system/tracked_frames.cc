@@ -257,7 +257,7 @@ bool TrackedFrames::IsMended(const Piece& piece, const Trajectory& found) const 
 void TrackedFrames::Smooth(const std::function<bool()>& should_stop) {
   for (const PartId part : Parts()) {
     if (should_stop && should_stop()) return;
-    const Trajectory smooth = Smoothed(PathOf(part));
+    const Trajectory smooth = SmoothPathOf(part);
     std::vector<AnchoredPose> poses;
     {
       const auto map = map_->Read();
@@ -296,6 +296,7 @@ std::vector<PartId> TrackedFrames::Parts() const {
 }
 
 Trajectory TrackedFrames::PathOf(PartId part) const { return PathOf(part, false); }
+Trajectory TrackedFrames::SmoothPathOf(PartId part) const { return Smoothed(PathOf(part)); }
 Trajectory TrackedFrames::LivePathOf(PartId part) const { return PathOf(part, true); }
 
 Trajectory TrackedFrames::PathOf(PartId part, bool only_live) const {

@@ -79,7 +79,8 @@ class TrackedFrames {
   // The parts that have frames: the one with the most first.
   std::vector<PartId> Parts() const;
   Trajectory PathOf(PartId part) const;
-  Trajectory LivePathOf(PartId part) const;  // of those that had their pose when their turn came
+  Trajectory SmoothPathOf(PartId part) const;  // what Smooth would make of it
+  Trajectory LivePathOf(PartId part) const;    // of those that had their pose when their turn came
   size_t LiveCountOf(PartId part) const;
 
  private:

@@ -78,8 +78,7 @@ void SightingAligner::AlignViews(const Paths& paths, const std::function<bool()>
 SightingAligner::View SightingAligner::ViewOf(const Paths& paths, PartId part, double timestamp_s,
                                               const Rigid3& cam_from_world) const {
   const auto path = paths.find(part);
-  const bool has_motion = camera_.readout_s > 0 && path != paths.end();
-  return {cam_from_world, has_motion ? MotionAt(path->second, timestamp_s) : std::nullopt};
+  return {cam_from_world, path != paths.end() ? MotionAt(path->second, timestamp_s) : std::nullopt};
 }
 
 // Of the keyframes that see a landmark the middle one in time: others show it from no more than half of the

@@ -33,8 +33,9 @@ class SightingAligner {
   void Keep(double timestamp_s, const cv::Mat& grey) { images_.Keep(timestamp_s, grey); }
 
   // In the map as it is now, with poses that are right to some pixels: moves the sightings of the views, and
-  // returns where keyframes see landmarks, of those that are found. paths: of the map's parts, from which a
-  // rolling shutter takes how the camera moved. `should_stop` may be empty; when it says so, the others stay.
+  // returns where keyframes see landmarks, of those that are found. paths: of the map's parts, which tell of
+  // a rolling shutter's camera how it moved; may be empty. `should_stop` may be empty; when it says so, the
+  // others stay.
   AlignedKeypoints Align(const Paths& paths, const std::function<bool()>& should_stop,
                          std::vector<FrameView>* views);
   // The same without the keyframes.
@@ -55,7 +56,7 @@ class SightingAligner {
   // Of which an image is loaded.
   struct View {
     Rigid3 cam_from_world;
-    std::optional<SteadyMotion> motion;  // of a rolling shutter's camera, if it is known
+    std::optional<SteadyMotion> motion;  // if it is known
   };
   View ViewOf(const Paths& paths, PartId part, double timestamp_s, const Rigid3& cam_from_world) const;
   // Moves the sighting; false, and it stays in the image, where that does not show the landmark.
