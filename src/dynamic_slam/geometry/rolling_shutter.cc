@@ -14,16 +14,18 @@ SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b) {
   return {0.5 * (a.angular_rad_s + b.angular_rad_s), 0.5 * (a.linear_per_s + b.linear_per_s)};
 }
 
-std::optional<SteadyMotion> MotionAt(const Trajectory& path, double timestamp_s) {
-  constexpr double kMostBetween_s = 0.25;  // of the path before and after: the motion may change
-  const auto at =
-      std::lower_bound(path.begin(), path.end(), timestamp_s,
-                       [](const StampedPose& pose, double stamp_s) { return pose.timestamp_s < stamp_s; });
-  if (at == path.begin() || at == path.end() || at + 1 == path.end()) return std::nullopt;
-  const StampedPose &before = *(at - 1), &after = *(at + 1);
-  const double dt_s = after.timestamp_s - before.timestamp_s;
-  if (at->timestamp_s != timestamp_s || !(dt_s > 0) || dt_s > kMostBetween_s) return std::nullopt;
-  return MotionBetween(after.world_from_cam.Inverse() * before.world_from_cam, dt_s);
+std::map<double, SteadyMotion> MotionsAlong(const Trajectory& path) {
+  constexpr double kSteady_s = 0.125;  // later the motion may be another
+  const auto follows = [&](size_t i) { return path[i].timestamp_s - path[i - 1].timestamp_s <= kSteady_s; };
+  std::map<double, SteadyMotion> motions;
+  for (size_t i = 0; i < path.size(); ++i) {
+    const StampedPose& before = path[i > 0 && follows(i) ? i - 1 : i];
+    const StampedPose& after = path[i + 1 < path.size() && follows(i + 1) ? i + 1 : i];
+    if (!(before.timestamp_s < after.timestamp_s)) continue;
+    motions[path[i].timestamp_s] = MotionBetween(after.world_from_cam.Inverse() * before.world_from_cam,
+                                                 after.timestamp_s - before.timestamp_s);
+  }
+  return motions;
 }
 
 Eigen::Vector2d AtMiddleRow(const Camera& camera, const SteadyMotion& motion, const Eigen::Vector2d& ideal_px,

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <map>
 
 #include <Eigen/Core>
 
@@ -23,9 +23,9 @@ SteadyMotion MotionBetween(const Rigid3& later_from_earlier, double dt_s);
 // The mean of two: at the pose between them.
 SteadyMotion Mean(const SteadyMotion& a, const SteadyMotion& b);
 
-// How the camera moved about a pose of its path, from the one before to the one after it; nothing where one
-// of the three is missing, or they are farther apart than a motion is steady.
-std::optional<SteadyMotion> MotionAt(const Trajectory& path, double timestamp_s);
+// How the camera moved about the poses of its path, by their stamps: from the frame before to the one after,
+// or to one of them where the other is missing. Of poses that lack both nobody knows.
+std::map<double, SteadyMotion> MotionsAlong(const Trajectory& path);
 
 // A rolling shutter reads the rows of an image one after the other, for Camera::readout_s in all, and a pose
 // is that of the camera when it reads the middle one. Returns where (ideal px) the camera would have seen

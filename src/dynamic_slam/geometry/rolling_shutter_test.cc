@@ -90,18 +90,16 @@ TEST(RollingShutter, APathTellsHowItsCameraMoved) {
   Trajectory path;
   for (const double stamp_s : {0.0, 0.1, 0.2, 0.3, 0.7})
     path.push_back({stamp_s, Later(motion, stamp_s).Inverse()});
-  for (const double stamp_s : {0.1, 0.2}) {
-    const std::optional<SteadyMotion> found = MotionAt(path, stamp_s);
-    ASSERT_TRUE(found.has_value()) << stamp_s;
-    EXPECT_LT((found->angular_rad_s - motion.angular_rad_s).norm(), 1e-3);
+  const std::map<double, SteadyMotion> motions = MotionsAlong(path);
+  EXPECT_EQ(motions.size(), 4u) << "of the last pose no neighbour is near";
+  EXPECT_FALSE(motions.contains(0.7));
+  for (const auto& [stamp_s, found] : motions) {
+    EXPECT_LT((found.angular_rad_s - motion.angular_rad_s).norm(), 1e-3) << stamp_s;
     // As the camera turns between the poses: half of the angle, 0.2 s long, times the velocity.
-    EXPECT_LT((found->linear_per_s - motion.linear_per_s).norm(), 0.03);
+    EXPECT_LT((found.linear_per_s - motion.linear_per_s).norm(), 0.03) << stamp_s;
   }
-  EXPECT_FALSE(MotionAt(path, 0).has_value()) << "none before";
-  EXPECT_FALSE(MotionAt(path, 0.15).has_value()) << "no pose";
-  EXPECT_FALSE(MotionAt(path, 0.3).has_value()) << "0.5 s from one pose to the other";
-  EXPECT_FALSE(MotionAt(path, 0.7).has_value());
-  EXPECT_FALSE(MotionAt({}, 0).has_value());
+  EXPECT_TRUE(MotionsAlong({}).empty());
+  EXPECT_TRUE(MotionsAlong({path[0]}).empty());
 }
 
 }  // namespace

@@ -41,14 +41,15 @@ struct CalibrationCost {
 
 // Where the keypoint of a landmark goes for each second that the readout is longer, px.
 Eigen::Vector2d RowFlow(const Camera& camera, const Keyframe& keyframe, const Keypoint& keypoint,
-                        const Eigen::Vector3d& x_in_world, const std::optional<SteadyMotion>& motion) {
+                        const Eigen::Vector3d& x_in_world, const std::map<double, SteadyMotion>& motions) {
   const double depth = (keyframe.cam_from_world() * x_in_world).z();
-  if (!motion.has_value() || depth < kMinProjectionDepth) return Eigen::Vector2d::Zero();
+  const auto motion = motions.find(keyframe.timestamp_s());
+  if (motion == motions.end() || depth < kMinProjectionDepth) return Eigen::Vector2d::Zero();
   constexpr double kStep_s = 1e-3;
   Camera rolling = camera;
   rolling.readout_s = kStep_s;
   const Eigen::Vector2d px(keypoint.x, keypoint.y);
-  return (px - AtMiddleRow(rolling, *motion, px, keypoint.raw_y, 1 / depth)) / kStep_s;
+  return (px - AtMiddleRow(rolling, motion->second, px, keypoint.raw_y, 1 / depth)) / kStep_s;
 }
 
 // Bundle adjustment of the first keyframes of a map and what they see, in which the camera's numbers can be
@@ -57,10 +58,14 @@ class CalibrationBundle {
  public:
   // frames: of which keyframes' motion is known.
   CalibrationBundle(const Camera& camera, const Map& map, const Trajectory& frames, size_t most_keyframes)
-      : camera_(camera) {
+      : camera_(camera), motions_(MotionsAlong(frames)) {
+    // At their ends it is known from one side only, and where a map begins frames are missing there.
+    if (!frames.empty()) {
+      motions_.erase(frames.front().timestamp_s);
+      motions_.erase(frames.back().timestamp_s);
+    }
     map.keyframes().ForEach([&](const Keyframe& keyframe) {
       if (keyframe.part() != map.Parts().front() || poses_.size() == most_keyframes) return;
-      motions_[keyframe.id()] = MotionAt(frames, keyframe.timestamp_s());
       PoseBlock& block = poses_[keyframe.id()];
       Eigen::Map<Eigen::Quaterniond>(block.data()) = keyframe.cam_from_world().rotation;
       Eigen::Map<Eigen::Vector3d>(block.data() + 4) = keyframe.cam_from_world().translation;
@@ -113,20 +118,20 @@ class CalibrationBundle {
       const Keypoint& keypoint = keyframe.keypoint(observation.keypoint);
       const double sigma_px = map.octave_scales()[static_cast<size_t>(keypoint.octave)];
       problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<CalibrationCost, 2, kPoseBlockSize, 3, 1, 1, 2>(new CalibrationCost{
-              {camera_.fx, camera_.fy},
-              {keypoint.x - camera_.cx, keypoint.y - camera_.cy},
-              RowFlow(camera_, keyframe, keypoint, landmark.position(), motions_.at(observation.keyframe)),
-              1 / sigma_px}),
+          new ceres::AutoDiffCostFunction<CalibrationCost, 2, kPoseBlockSize, 3, 1, 1, 2>(
+              new CalibrationCost{{camera_.fx, camera_.fy},
+                                  {keypoint.x - camera_.cx, keypoint.y - camera_.cy},
+                                  RowFlow(camera_, keyframe, keypoint, landmark.position(), motions_),
+                                  1 / sigma_px}),
           new ceres::HuberLoss(2), poses_.at(observation.keyframe).data(), point, &factor, &more_readout_s,
           lens.data());
     }
   }
 
   const Camera& camera_;
+  std::map<double, SteadyMotion> motions_;  // by stamp
   ceres::Problem problem_;
   std::map<KeyframeId, PoseBlock> poses_;
-  std::map<KeyframeId, std::optional<SteadyMotion>> motions_;
   std::map<LandmarkId, Eigen::Vector3d> points_;
 };
 

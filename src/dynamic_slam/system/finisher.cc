@@ -103,11 +103,11 @@ Trajectory Finisher::MainPath() const {
   return parts.empty() ? Trajectory() : tracked_->PathOf(parts.front());
 }
 
-SightingAligner::Paths Finisher::SmoothPaths() const {
-  SightingAligner::Paths paths;
-  if (!(camera_.readout_s > 0)) return paths;
-  for (const PartId part : tracked_->Parts()) paths[part] = tracked_->SmoothPathOf(part);
-  return paths;
+SightingAligner::Motions Finisher::Motions() const {
+  SightingAligner::Motions motions;
+  if (!(camera_.readout_s > 0)) return motions;
+  for (const PartId part : tracked_->Parts()) motions[part] = MotionsAlong(tracked_->SmoothPathOf(part));
+  return motions;
 }
 
 BundleSummary Finisher::Finish(const std::function<bool()>& should_stop) {
@@ -311,7 +311,7 @@ void Finisher::RefineMap(bool aligned, const std::function<bool()>& should_stop,
     tracked_->Replace(refiner_->Refine(tracked_->Poses(), should_stop, &views));
     if (views.empty() && !options_.mapper.motion_prior) return;  // keyframes tell all
     PathEvidence path{views, noises};
-    if (aligned) path.aligned = aligner_->Align(SmoothPaths(), should_stop, &views);
+    if (aligned) path.aligned = aligner_->Align(Motions(), should_stop, &views);
     if (!AdjustAll(camera_, options_.mapper, should_stop, map_, &path).usable) return;
   }
 }
@@ -329,7 +329,7 @@ void Finisher::RefinePath(bool aligned, const MotionNoises& noises,
   tracked_->Remove(refuted);
   frames_refuted_ += refuted.size();
   if (!adjusts) return;
-  if (aligned) aligner_->AlignViews(SmoothPaths(), should_stop, &views);
+  if (aligned) aligner_->AlignViews(Motions(), should_stop, &views);
   AdjustPath(camera_, options_.mapper.final_bundle, noises, should_stop, map_, &views);
   tracked_->Move(views);
 }

@@ -68,8 +68,8 @@ class Finisher {
   bool AdjustsMap() const { return options_.final_bundle && ChangesMap(); }
   bool Smooths() const { return options_.smooth_path && mode_ == RunMode::kOffline; }
   Trajectory MainPath() const;
-  // Of a rolling shutter's camera, for the aligner.
-  SightingAligner::Paths SmoothPaths() const;
+  // Of a rolling shutter's camera, as the smoothed paths have them.
+  SightingAligner::Motions Motions() const;
 
   // Finds poses of frames that have none, and makes one of parts of the map that fit together. grows: by a
   // plan that the backfiller has.

@@ -32,15 +32,15 @@ bool SightingAligner::Load(double timestamp_s) {
   return true;
 }
 
-AlignedKeypoints SightingAligner::Align(const Paths& paths, const std::function<bool()>& should_stop,
+AlignedKeypoints SightingAligner::Align(const Motions& motions, const std::function<bool()>& should_stop,
                                         std::vector<FrameView>* views) {
-  AlignViews(paths, should_stop, views);
+  AlignViews(motions, should_stop, views);
   AlignedKeypoints aligned;
   const auto map = map_->Read();
   map->keyframes().ForEach([&](const Keyframe& keyframe) {
     if ((should_stop && should_stop()) || !keyframe.frame_id().IsValid()) return;
     if (!Load(keyframe.timestamp_s())) return;
-    const View view = ViewOf(paths, keyframe.part(), keyframe.timestamp_s(), keyframe.cam_from_world());
+    const View view = ViewOf(motions, keyframe.part(), keyframe.timestamp_s(), keyframe.cam_from_world());
     std::vector<AlignedKeypoint>& of_keyframe = aligned[keyframe.id()];
     of_keyframe.resize(keyframe.features().size());
     keyframe.ForEachLandmark([&](uint32_t i, LandmarkId landmark) {
@@ -62,7 +62,7 @@ AlignedKeypoints SightingAligner::Align(const Paths& paths, const std::function<
   return aligned;
 }
 
-void SightingAligner::AlignViews(const Paths& paths, const std::function<bool()>& should_stop,
+void SightingAligner::AlignViews(const Motions& motions, const std::function<bool()>& should_stop,
                                  std::vector<FrameView>* views) {
   DS_TRACE("align");
   const auto map = map_->Read();
@@ -70,15 +70,17 @@ void SightingAligner::AlignViews(const Paths& paths, const std::function<bool()>
   for (FrameView& view : *views) {
     if (should_stop && should_stop()) return;
     if (!Load(view.timestamp_s)) continue;
-    const View seen = ViewOf(paths, view.part, view.timestamp_s, view.cam_from_world);
+    const View seen = ViewOf(motions, view.part, view.timestamp_s, view.cam_from_world);
     for (FrameView::Sighting& sighting : view.sightings) AlignSighting(*map, seen, &sighting);
   }
 }
 
-SightingAligner::View SightingAligner::ViewOf(const Paths& paths, PartId part, double timestamp_s,
+SightingAligner::View SightingAligner::ViewOf(const Motions& motions, PartId part, double timestamp_s,
                                               const Rigid3& cam_from_world) const {
-  const auto path = paths.find(part);
-  return {cam_from_world, path != paths.end() ? MotionAt(path->second, timestamp_s) : std::nullopt};
+  const auto of_part = motions.find(part);
+  if (of_part == motions.end()) return {cam_from_world, {}};
+  const auto motion = of_part->second.find(timestamp_s);
+  return {cam_from_world, motion != of_part->second.end() ? std::optional(motion->second) : std::nullopt};
 }
 
 // Of the keyframes that see a landmark the middle one in time: others show it from no more than half of the

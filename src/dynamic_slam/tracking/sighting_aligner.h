@@ -13,7 +13,6 @@
 #include "dynamic_slam/features/patch_alignment.h"
 #include "dynamic_slam/geometry/camera.h"
 #include "dynamic_slam/geometry/rolling_shutter.h"
-#include "dynamic_slam/geometry/trajectory.h"
 #include "dynamic_slam/map/frame.h"
 #include "dynamic_slam/map/shared_map.h"
 #include "dynamic_slam/tracking/image_archive.h"
@@ -25,7 +24,8 @@ namespace dynamic_slam {
 // images are kept in a file.
 class SightingAligner {
  public:
-  using Paths = std::map<PartId, Trajectory>;
+  // Of the frames of each part of the map, by stamp (MotionsAlong).
+  using Motions = std::map<PartId, std::map<double, SteadyMotion>>;
 
   SightingAligner(const Camera& camera, SharedMap* map);
 
@@ -33,13 +33,13 @@ class SightingAligner {
   void Keep(double timestamp_s, const cv::Mat& grey) { images_.Keep(timestamp_s, grey); }
 
   // In the map as it is now, with poses that are right to some pixels: moves the sightings of the views, and
-  // returns where keyframes see landmarks, of those that are found. paths: of the map's parts, which tell of
-  // a rolling shutter's camera how it moved; may be empty. `should_stop` may be empty; when it says so, the
-  // others stay.
-  AlignedKeypoints Align(const Paths& paths, const std::function<bool()>& should_stop,
+  // returns where keyframes see landmarks, of those that are found. motions: take what a rolling shutter read
+  // to its middle row; frames that have none keep the place in the image. `should_stop` may be empty; when it
+  // says so, the others stay.
+  AlignedKeypoints Align(const Motions& motions, const std::function<bool()>& should_stop,
                          std::vector<FrameView>* views);
   // The same without the keyframes.
-  void AlignViews(const Paths& paths, const std::function<bool()>& should_stop,
+  void AlignViews(const Motions& motions, const std::function<bool()>& should_stop,
                   std::vector<FrameView>* views);
 
   void Clear() { images_.Clear(); }
@@ -58,7 +58,7 @@ class SightingAligner {
     Rigid3 cam_from_world;
     std::optional<SteadyMotion> motion;  // if it is known
   };
-  View ViewOf(const Paths& paths, PartId part, double timestamp_s, const Rigid3& cam_from_world) const;
+  View ViewOf(const Motions& motions, PartId part, double timestamp_s, const Rigid3& cam_from_world) const;
   // Moves the sighting; false, and it stays in the image, where that does not show the landmark.
   bool AlignSighting(const Map& map, const View& view, FrameView::Sighting* sighting) const;
   // Where the pixel is of what lies at a place in world, when the middle row is read.

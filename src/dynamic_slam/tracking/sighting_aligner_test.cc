@@ -167,16 +167,17 @@ TEST_F(SightingAlignerTest, WhatARollingShutterReadGoesToTheMiddleRowWhereThePat
   Camera rolling = camera_;
   rolling.readout_s = 0.03;
   SightingAligner aligner(rolling, &shared_map_);
-  SightingAligner::Paths paths;
+  Trajectory path;
   for (size_t i = 0; i < keyframes_.size(); ++i) {
     const auto at = static_cast<double>(i);
     aligner.Keep(StampOf(at), Render(PoseAt(at)));
-    paths[PartId(0)].push_back({StampOf(at), PoseAt(at).Inverse()});
+    path.push_back({StampOf(at), PoseAt(at).Inverse()});
   }
-  const std::optional<SteadyMotion> motion = MotionAt(paths[PartId(0)], StampOf(1));
-  ASSERT_TRUE(motion.has_value());
+  const SightingAligner::Motions motions{{PartId(0), MotionsAlong(path)}};
+  ASSERT_TRUE(motions.at(PartId(0)).contains(StampOf(1)));
+  const SteadyMotion& motion = motions.at(PartId(0)).at(StampOf(1));
   std::vector<FrameView> views{ViewAt(1)};
-  const AlignedKeypoints aligned = aligner.Align(paths, {}, &views);
+  const AlignedKeypoints aligned = aligner.Align(motions, {}, &views);
   int found = 0;
   double most = 0;
   for (uint32_t i = 0; i < points_.size(); ++i) {
@@ -186,7 +187,7 @@ TEST_F(SightingAlignerTest, WhatARollingShutterReadGoesToTheMiddleRowWhereThePat
     ++found;
     const Eigen::Vector2d read_px = Expected(PoseAt(1), i);
     const double depth = (PoseAt(1) * points_[i]).z();
-    const Eigen::Vector2d px = AtMiddleRow(rolling, *motion, read_px, read_px.y(), 1 / depth);
+    const Eigen::Vector2d px = AtMiddleRow(rolling, motion, read_px, read_px.y(), 1 / depth);
     most = std::max(most, (px - read_px).norm());
     EXPECT_LT((of_view.ideal_px.cast<double>() - px).norm(), 0.15) << i;
     EXPECT_LT((of_keyframe.ideal_px.cast<double>() - px).norm(), 0.15) << i;
