@@ -23,6 +23,11 @@ constexpr size_t kMostGrownOver = 300;
 // without, by 0.0110, 0.0103, 0.0099 after one, two, three.
 constexpr int kViewRounds = 2;
 
+// So often the map is linked to what it has of other times, while more is found: links move it to where they
+// are looked for. Followers 21 err by 0.0098 m after one, by 0.0064 after three; nearly all find nothing
+// more.
+constexpr int kLinkRounds = 3;
+
 // Whether the part has keyframes of a map that was loaded.
 bool IsFromFile(const Map& map, PartId part) {
   bool is_from_file = false;
@@ -170,7 +175,7 @@ BundleSummary Finisher::Complete(bool grows, const std::function<bool()>& should
   BundleSummary bundle;
   if (AdjustsMap()) {
     bundle = back_end_->mapper().Finish(should_stop);
-    if (options_.loop.enabled && LinkRevisits(should_stop)) bundle = back_end_->mapper().Finish(should_stop);
+    if (options_.loop.enabled) LinkRevisits(should_stop, &bundle);
   }
   if (backfiller_.has_value()) tracked_->AddFound(backfiller_->Find(tracked_->Poses(), should_stop));
   return bundle;
@@ -299,10 +304,15 @@ void Finisher::JoinAlikeParts(const std::function<bool()>& should_stop) {
   }
 }
 
-bool Finisher::LinkRevisits(const std::function<bool()>& should_stop) {
-  const int links = RevisitFinder(camera_, options_.tracker, map_).LinkAll(should_stop);
+void Finisher::LinkRevisits(const std::function<bool()>& should_stop, BundleSummary* bundle) {
+  int links = 0;
+  for (int round = 0; round < kLinkRounds; ++round) {
+    const int found = RevisitFinder(camera_, options_.tracker, map_).LinkAll(should_stop);
+    if (found == 0) break;
+    links += found;
+    *bundle = back_end_->mapper().Finish(should_stop);
+  }
   back_end_->ReportRevisits(links);
-  return links > 0;
 }
 
 void Finisher::RefineMap(bool aligned, const std::function<bool()>& should_stop, MotionNoises* noises) {

@@ -93,8 +93,9 @@ class Finisher {
   bool JoinBySharedFrames(const std::set<double>& stamps, const std::function<bool()>& should_stop);
   // Makes one of the main part and others in which keyframes show what it shows.
   void JoinAlikeParts(const std::function<bool()>& should_stop);
-  // Links keyframes to what the map has of the same things from another time; whether there are such.
-  bool LinkRevisits(const std::function<bool()>& should_stop);
+  // Links keyframes to what the map has of the same things from another time, and adjusts it. bundle: gets
+  // what the last adjustment did, if there was one.
+  void LinkRevisits(const std::function<bool()>& should_stop, BundleSummary* bundle);
   // Adjusts the map to what frames see that are tracked once more in it. noises: gets how the camera was
   // moved, where that is known.
   void RefineMap(bool aligned, const std::function<bool()>& should_stop, MotionNoises* noises);

@@ -21,6 +21,9 @@ constexpr double kMostSeenOfStrangers = 0.4;
 constexpr int kVisits = 3;
 constexpr size_t kVisitKeyframes = 20;
 
+// Of the links that fit a pose so many can be right, or more are wrong: those on somebody's clothes fit too.
+constexpr double kMostlyRight = 0.5;
+
 // Times the greater of two median depths: landmarks are known again from no farther (LandmarkProjector).
 constexpr double kReach = 4;
 
@@ -208,6 +211,7 @@ std::optional<RevisitFinder::Revisit> RevisitFinder::Locate(const Map& map, cons
   for (uint32_t i = 0; i < frame.landmarks.size(); ++i) {
     if (frame.landmarks[i].IsValid()) revisit.links.emplace_back(i, frame.landmarks[i]);
   }
+  if (revisit.inliers < kMostlyRight * static_cast<double>(revisit.links.size())) return std::nullopt;
   return revisit;
 }
 

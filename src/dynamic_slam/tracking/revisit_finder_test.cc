@@ -139,6 +139,22 @@ TEST_F(RevisitFinderTest, FewAreNotBelievedWhereEachSaysSomethingElse) {
   EXPECT_EQ(LinkAll(), 0);
 }
 
+TEST_F(RevisitFinderTest, WhatMovesMoreLikelyThanNotIsNotLinked) {
+  VisitTwice();
+  const auto set_static_probability = [&](float probability) {
+    for (const auto& of_visit : keyframes_) {
+      for (const KeyframeId id : of_visit) {
+        Keyframe& keyframe = scene_.map.keyframes().At(id);
+        keyframe.set_static_probability(std::vector<float>(keyframe.features().size(), probability));
+      }
+    }
+  };
+  set_static_probability(0.4f);
+  EXPECT_EQ(LinkAll(), 0);
+  set_static_probability(0.9f);
+  EXPECT_GT(LinkAll(), 300);
+}
+
 TEST_F(RevisitFinderTest, StopsWhenAsked) {
   VisitTwice();
   EXPECT_EQ(LinkAll(true), 0);
