@@ -33,6 +33,7 @@ struct FrameObjects {
   // The frame that the detector was asked about and has not answered: who came since it was asked before is
   // not known. Not valid when there is none, or when it is too late to hope for an answer.
   FrameId untold_from;
+  FrameId told_to;                // the last frame that it has answered about
   std::vector<LateObjects> late;  // oldest first
 };
 

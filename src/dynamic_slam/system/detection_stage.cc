@@ -65,6 +65,7 @@ std::optional<DetectionResult> DetectionStage::TakeAnswer(double timestamp_s, do
                                      Clock::now() + std::chrono::duration_cast<Clock::duration>(patience));
   }
   if (!answer_.has_value() || !IsAnswerDue(open_->answer_due_s, timestamp_s)) return std::nullopt;
+  told_to_ = open_->frame;
   open_.reset();
   std::optional<DetectionResult> answer = std::exchange(answer_, std::nullopt);
   if (answer->failure.empty()) return answer;
@@ -98,6 +99,7 @@ FrameObjects DetectionStage::Collect(FrameId frame, double timestamp_s,
   }
   objects.boxes = score_.Update(compensation_->Update(std::move(input)));
   objects.untold_from = UntoldFrom(timestamp_s);
+  objects.told_to = told_to_;
   if (told_late_.IsValid()) objects.late = NewlyTold(told_late_);
   return objects;
 }
@@ -132,7 +134,7 @@ void DetectionStage::Reset() {
   open_.reset();
   answer_.reset();
   failure_.clear();
-  told_late_ = FrameId();
+  told_to_ = told_late_ = FrameId();
   report_ = DetectionReport();
 }
 

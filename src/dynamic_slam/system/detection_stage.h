@@ -91,6 +91,7 @@ class DetectionStage {
   std::optional<Question> open_;
   std::optional<DetectionResult> answer_;  // that came before it was due
   std::string failure_;                    // of an answer taken in this frame
+  FrameId told_to_;                        // of the last answer
   FrameId told_late_;                      // of the answer taken in this frame, when it came late
   DetectionReport report_;
 };

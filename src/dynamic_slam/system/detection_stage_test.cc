@@ -105,6 +105,7 @@ TEST_F(DetectionStageTest, WhatIsUntoldIsAwaitedForALimitedTime) {
   for (uint32_t i = 0; i < 10; ++i) {
     const FrameObjects objects = Process(i);
     EXPECT_EQ(objects.untold_from, FrameId(i / 3 * 3)) << "asked about every third frame: " << i;
+    EXPECT_EQ(objects.told_to, i < 3 ? FrameId() : FrameId(i / 3 * 3 - 3)) << i;
   }
   stage_->Reset();
   EXPECT_EQ(Process(0).untold_from, FrameId(0));

@@ -69,7 +69,7 @@ void Finisher::Remember(const Frame& frame, const TrackingResult& tracking, cons
   if (refiner_.has_value() && ChangesMap()) refiner_->Keep(frame, tracking.min_inliers);
   if (aligner_.has_value() && ChangesMap()) aligner_->Keep(frame.timestamp_s, grey);
   if (!backfiller_.has_value()) return;
-  if (tracking.last_was_withdrawn) backfiller_->LastWasWithdrawn();
+  backfiller_->LastWereWithdrawn(tracking.withdrawn);
   if (tracking.part_was_erased) backfiller_->PartWasErased();
   if (!has_pose || tracking.is_provisional) {
     backfiller_->Keep(frame, tracking.min_inliers, has_pose);

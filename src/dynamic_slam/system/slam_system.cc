@@ -126,7 +126,7 @@ void SlamSystem::ThrowIfFailed() const {
 void SlamSystem::Remember(const FrameResult& result) {
   const TrackingResult& tracking = result.tracking;
   const Frame& frame = tracker_.frame();
-  if (tracking.last_was_withdrawn) tracked_.RemoveLast();
+  for (int i = 0; i < tracking.withdrawn; ++i) tracked_.RemoveLast();
   if (tracking.part_was_erased) tracked_.RemoveThoseOfErasedParts();
   if (tracking.state == TrackingState::kTracking) {
     if (options_.backfill) {

@@ -54,10 +54,9 @@ void Backfiller::PartWasErased() {
   for (KeptFrame& kept : kept_) kept.has_pose = false;
 }
 
-void Backfiller::LastWasWithdrawn() {
-  const auto last =
-      std::find_if(kept_.rbegin(), kept_.rend(), [](const KeptFrame& kept) { return kept.has_pose; });
-  if (last != kept_.rend()) last->has_pose = false;
+void Backfiller::LastWereWithdrawn(int count) {
+  for (auto kept = kept_.rbegin(); kept != kept_.rend() && count > 0; ++kept)
+    count -= std::exchange(kept->has_pose, false);
 }
 
 void Backfiller::Clear() {

@@ -34,8 +34,8 @@ class Backfiller {
   void ForgetPosed();
   // They have none any more.
   void PartWasErased();
-  // The last of them has none any more.
-  void LastWasWithdrawn();
+  // The last so many of them have none any more.
+  void LastWereWithdrawn(int count);
 
   // The poses of frames kept, in the order in which they were found. known: of all frames that have one, in a
   // part of the map that is there. `should_stop` may be empty; when it says so, that is all.

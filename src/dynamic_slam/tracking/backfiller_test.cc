@@ -222,15 +222,14 @@ TEST_F(BackfillerTest, FramesThatAreNotToBeKeptAreNotLookedFor) {
   EXPECT_EQ(backfiller_.Find(known_, {}).size(), 2u);
 }
 
-TEST_F(BackfillerTest, OnlyTheLastPoseIsWithdrawn) {
-  backfiller_.Keep(FrameAt(0.4), kMinInliers, true);
-  backfiller_.Keep(FrameAt(0.5), kMinInliers, true);
+TEST_F(BackfillerTest, OnlyTheLastPosesAreWithdrawn) {
+  for (const double t : {0.3, 0.4, 0.5}) backfiller_.Keep(FrameAt(t), kMinInliers, true);
   backfiller_.Keep(FrameAt(0.6), kMinInliers, false);
-  backfiller_.LastWasWithdrawn();
+  backfiller_.LastWereWithdrawn(2);
   backfiller_.ForgetPosed();
   std::vector<double> stamps;
   for (const AnchoredPose& pose : backfiller_.Find(known_, {})) stamps.push_back(pose.timestamp_s);
-  EXPECT_THAT(stamps, UnorderedElementsAre(0.5, 0.6));
+  EXPECT_THAT(stamps, UnorderedElementsAre(0.4, 0.5, 0.6));
 }
 
 TEST_F(BackfillerTest, StopsWhenItIsTold) {

@@ -124,10 +124,10 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
   result.keypoints = static_cast<int>(keypoints);
   if (!last_has_pose_) filter_.WatchBeforePose(flow_, last_, &frame_);
   if (!shows_nothing_ && (last_has_pose_ ? TrackFrame() : Relocalise())) {
-    is_unconfirmed_ = !last_has_pose_;
+    unconfirmed_.Add(frame_.id, !last_has_pose_, objects);
     AcceptPose();
-    if (!start_is_certain_ && !is_unconfirmed_) ReviewStart(&result);
-    if (state_ == TrackingState::kTracking && !result.part_was_erased && !is_unconfirmed_) {
+    if (!start_is_certain_ && !unconfirmed_.Any()) ReviewStart(&result);
+    if (state_ == TrackingState::kTracking && !result.part_was_erased && !unconfirmed_.Any()) {
       InsertKeyframeIfDue(keyframes_waiting, &result);
     }
   } else if (state_ == TrackingState::kInitialising) {
@@ -136,8 +136,9 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
     state_ = TrackingState::kLost;
     if (!shows_nothing_) {
       velocity_.reset();
-      result.last_was_withdrawn = std::exchange(is_unconfirmed_, false);
-      if (result.last_was_withdrawn) reason_ += "; the last pose, found by its looks, is withdrawn";
+      result.withdrawn = unconfirmed_.Withdraw();
+      if (result.withdrawn > 0)
+        reason_ += fmt::format("; poses by looks alone, of {} frames, are withdrawn", result.withdrawn);
     }
     lost_frames_ = follows_nothing_ && !shows_nothing_ ? 1 : lost_frames_ + 1;
     StartAnewWhenLostForLong(&result);
@@ -149,7 +150,7 @@ TrackingResult Tracker::Track(const FrameObjects& objects, int keyframes_waiting
     start_is_young_ = part == start_part_ &&
                       (!start_is_certain_ || map_->Read()->KeyframesIn(part) <= options_.small_map_keyframes);
   }
-  result.is_provisional = start_is_young_ || is_unconfirmed_;
+  result.is_provisional = start_is_young_ || unconfirmed_.Any();
   result.min_inliers = Limits().found;
   result.state = state_;
   result.inliers = inliers_;
@@ -169,7 +170,7 @@ void Tracker::AcceptPose() {
     start_is_certain_ = true;
   }
   state_ = TrackingState::kTracking;
-  if (!is_unconfirmed_) {
+  if (!unconfirmed_.Any()) {
     lost_frames_ = 0;
     CountVisibility();
   }
@@ -271,7 +272,8 @@ void Tracker::ForgetPose() {
   visibility_.Clear();
   state_ = TrackingState::kInitialising;
   start_is_certain_ = true;
-  start_is_young_ = is_unconfirmed_ = false;
+  start_is_young_ = false;
+  unconfirmed_ = {};
   last_has_pose_ = shows_nothing_ = false;
   velocity_.reset();
   lost_frames_ = 0;

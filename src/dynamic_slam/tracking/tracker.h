@@ -24,6 +24,7 @@
 #include "dynamic_slam/tracking/shutter_correction.h"
 #include "dynamic_slam/tracking/tracker_options.h"
 #include "dynamic_slam/tracking/tracking_state.h"
+#include "dynamic_slam/tracking/unconfirmed_poses.h"
 #include "dynamic_slam/tracking/visibility_log.h"
 
 namespace dynamic_slam {
@@ -41,7 +42,7 @@ struct TrackingResult {
   std::vector<AnchoredPose> earlier_frames;  // that have a pose since the map was made
   int min_inliers = 0;                       // that a pose of this image needs
   bool is_provisional = false;               // the pose may be withdrawn, or erased with its young part
-  bool last_was_withdrawn = false;           // the last pose: by its looks, and not confirmed by this image
+  int withdrawn = 0;                         // the last poses: by looks, and not confirmed by this image
   bool part_was_erased = false;              // of the map, with the poses of the frames in it
 };
 
@@ -138,9 +139,9 @@ class Tracker {
   bool follows_nothing_ = false;  // the image before this one was such a frame
   double image_interval_s_ = 0;   // since the last image
   bool start_is_certain_ = true;
-  PartId start_part_;               // of the map, that the last start made
-  bool start_is_young_ = false;     // its part is erased when the camera is lost now
-  bool is_unconfirmed_ = false;     // the last pose was found by its looks, and no image tracked from it yet
+  PartId start_part_;            // of the map, that the last start made
+  bool start_is_young_ = false;  // its part is erased when the camera is lost now
+  UnconfirmedPoses unconfirmed_;
   std::optional<Rigid3> velocity_;  // this frame's camera from the last frame's camera
   double velocity_dt_s_ = 0;        // the time between these two
   KeyframeId last_keyframe_;
