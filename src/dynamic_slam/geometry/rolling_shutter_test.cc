@@ -93,6 +93,7 @@ TEST(RollingShutter, APathTellsHowItsCameraMoved) {
   const std::map<double, SteadyMotion> motions = MotionsAlong(path);
   EXPECT_EQ(motions.size(), 4u) << "of the last pose no neighbour is near";
   EXPECT_FALSE(motions.contains(0.7));
+  EXPECT_FALSE(motions.contains(0.15)) << "no pose";
   for (const auto& [stamp_s, found] : motions) {
     EXPECT_LT((found.angular_rad_s - motion.angular_rad_s).norm(), 1e-3) << stamp_s;
     // As the camera turns between the poses: half of the angle, 0.2 s long, times the velocity.

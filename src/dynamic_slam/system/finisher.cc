@@ -24,8 +24,7 @@ constexpr size_t kMostGrownOver = 300;
 constexpr int kViewRounds = 2;
 
 // So often the map is linked to what it has of other times, while more is found: links move it to where they
-// are looked for. Followers 21 err by 0.0098 m after one, by 0.0064 after three; nearly all find nothing
-// more.
+// are looked for. Followers 21 err by 0.0098 m after one, by 0.0064 after three; most find none in the third.
 constexpr int kLinkRounds = 3;
 
 // Whether the part has keyframes of a map that was loaded.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "dynamic_slam/base/random.h"
 #include "dynamic_slam/base/trace.h"
